@@ -1,0 +1,23 @@
+# dlod_add_library(NAME GLOB... LINK libs...): a static library of all sources that match, Eigen precompiled.
+function(dlod_add_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINK;PCH" ${ARGN})
+  add_library(${name} STATIC ${ARG_SOURCES})
+  target_link_libraries(${name} PUBLIC dlod_options ${ARG_LINK})
+  if(ARG_PCH)
+    target_precompile_headers(${name} PRIVATE ${ARG_PCH})
+  endif()
+endfunction()
+
+# dlod_add_test_folder(FOLDER LINK libs...): one test program of all FOLDER/*_test.cpp, registered with CTest test by test.
+function(dlod_add_test_folder folder)
+  cmake_parse_arguments(ARG "" "" "LINK" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${folder}/*.cpp)
+  if(NOT sources)
+    return()
+  endif()
+  string(REPLACE "/" "_" name ${folder})
+  add_executable(test_${name} ${sources})
+  target_link_libraries(test_${name} PRIVATE ${ARG_LINK} dlod_test_main)
+  gtest_discover_tests(test_${name} TEST_PREFIX "${name}/" WORKING_DIRECTORY ${PROJECT_SOURCE_DIR}
+                       DISCOVERY_TIMEOUT 120 PROPERTIES TIMEOUT 300)
+endfunction()

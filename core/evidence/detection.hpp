@@ -1,0 +1,39 @@
+// From segments to detections: residuals, free-space evidence, and the pixels that belong together.
+#pragma once
+
+#include "core/residuals/residual_image.hpp"
+#include "core/types/frame.hpp"
+#include "core/types/parameter.hpp"
+
+#include <memory>
+
+namespace dlod {
+
+struct DetectionConfig {
+    bool use_residual = true;
+    bool use_free_space = true;
+    double max_range_m = 25.0;
+
+    template <class V>
+    void visit(V& v) {
+        v.flag("use_residual", use_residual, "cue: average registration residual of a segment (the paper's)");
+        v.flag("use_free_space", use_free_space, "cue: a return where earlier frames saw free space");
+        v.parameter("max_range_m", max_range_m, Range{1.0, 200.0}, "m", "objects farther away are not looked for");
+    }
+};
+
+/// Fills frame.detection.pixels and .detections (without track) from frame.prepared and frame.odometry, and remembers
+/// what was seen free. Frames in order.
+class Detector {
+  public:
+    Detector(const SensorModel& sensor, const DetectionConfig& config);
+    ~Detector();
+    void process(Frame& frame);
+    const Image<float>& residual_image() const;
+
+  private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace dlod

@@ -1,0 +1,31 @@
+// Dynamic points removal (paper, Sec. "Dynamic Points Removal"): labels every pixel, and keeps the points of non-static
+// objects out of keyframes and map.
+#pragma once
+
+#include "core/odometry/feedback.hpp"
+#include "core/types/frame.hpp"
+#include "core/types/parameter.hpp"
+
+namespace dlod {
+
+struct RemovalConfig {
+    double margin_m = 0.1;
+
+    template <class V>
+    void visit(V& v) {
+        v.parameter("margin_m", margin_m, Range{0.0, 1.0}, "m", "boxes are grown by this much on every side when their past is cleared");
+    }
+};
+
+/// Fills frame.detection.label, .instance and .dynamic_points, and the feedback to the odometry.
+class DynamicPointsRemoval {
+  public:
+    DynamicPointsRemoval(const SensorModel& sensor, const RemovalConfig& config) : sensor_(sensor), config_(config) {}
+    void process(Frame& frame, OdometryFeedback& feedback);
+
+  private:
+    SensorModel sensor_;
+    RemovalConfig config_;
+};
+
+}  // namespace dlod

@@ -1,0 +1,138 @@
+// One turn of the sensor and everything that the stages have found out about it.
+//
+// A Frame is allocated once, lives in a pool and is handed from stage to stage; each stage writes its own part and reads
+// the earlier ones. Images are destaggered, row-major, row 0 the top beam; the pixel (r, c) was fired in column
+// SensorModel::measurement_of(r, c). Arrays "by measurement" are in firing order.
+#pragma once
+
+#include "core/types/image.hpp"
+#include "core/types/imu_sample.hpp"
+#include "core/types/lie.hpp"
+#include "core/types/sensor_model.hpp"
+#include "core/types/track.hpp"
+
+#include <Eigen/Geometry>
+
+#include <cstdint>
+#include <vector>
+
+namespace dlod {
+
+/// Written by the frame builder.
+struct FrameHeader {
+    std::uint64_t sequence = 0;       ///< counts emitted frames from 0
+    std::uint32_t frame_id = 0;       ///< the sensor's own, wraps
+    std::int64_t stamp_ns = 0;        ///< sensor time of the last valid column: the frame's pose refers to it
+    std::int64_t first_stamp_ns = 0;  ///< sensor time of the first valid column
+    std::int64_t receive_ns = 0;      ///< host time (CLOCK_REALTIME) of the packet that completed it, capture time in replay
+    int valid_columns = 0;
+    bool usable = false;              ///< enough valid columns for odometry
+};
+
+/// Written by the frame builder, pixel by pixel as packets arrive; 0 where nothing was returned.
+struct RawImages {
+    Image<std::uint32_t> range_mm;      ///< from the beam's origin, as the sensor reports it
+    Image<std::uint8_t> reflectivity;
+    Image<std::uint16_t> signal;
+    Image<std::uint16_t> near_ir;
+};
+
+/// Written by the frame builder, by measurement.
+struct Columns {
+    std::vector<std::int64_t> time_ns;   ///< [W] sensor time; 0 where the column was lost
+    std::vector<std::uint32_t> status;   ///< [W] as sent
+    std::vector<std::uint8_t> valid;     ///< [W] 1 where the column arrived and is valid
+};
+
+/// Written by the geometry: each pixel's point in the sensor frame at the moment its column was fired.
+struct StructuredCloud {
+    Image<float> range_m;  ///< distance from the sensor origin (Eq. 2); 0: no return
+    Image<float> x, y, z;  ///< metres; 0, 0, 0 where there is no return
+};
+
+/// Points taken out of the image, with their pixels (structure of arrays).
+struct PointSelection {
+    AlignedVector<PixelIndex> pixel;
+    AlignedVector<float> x, y, z;     ///< sensor frame at firing time, metres
+    AlignedVector<float> nx, ny, nz;  ///< unit normal towards the sensor, from the range-image window
+    AlignedVector<float> planarity;   ///< 0 (scattered) .. 1 (flat): trust in the normal
+    AlignedVector<float> time_s;      ///< firing time relative to the frame's stamp, at most 0
+    std::size_t size() const { return pixel.size(); }
+    void clear() {
+        pixel.clear();
+        for (auto* v : {&x, &y, &z, &nx, &ny, &nz, &planarity, &time_s}) v->clear();
+    }
+};
+
+/// Written by the preparation, which needs no pose.
+struct Preparation {
+    Image<std::uint8_t> ground;        ///< 1 where the pixel belongs to the ground
+    Image<std::uint32_t> segment;      ///< 1 + index into segments, 0: none (ground, no return, too far)
+    std::vector<Segment> segments;
+    std::vector<PixelIndex> pixels;    ///< of all segments, grouped by segment
+    PointSelection points;             ///< input of the registration
+};
+
+/// Written by the odometry.
+struct OdometryResult {
+    enum Flag : std::uint32_t {
+        kImuUsed = 1U << 0,         ///< rotation and gravity came from the IMU
+        kDegenerate = 1U << 1,      ///< at least one direction was not observable and is held by prediction
+        kPredictedOnly = 1U << 2,   ///< too few columns or no convergence: the pose is the prediction
+        kReinitialized = 1U << 3,   ///< recovered after it was lost
+        kImuFaulty = 1U << 4,       ///< the IMU is there but absurd and is not used
+    };
+    bool valid = false;             ///< false: not to be used, not written, published with its flag
+    std::uint32_t flags = 0;
+    Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();  ///< at the frame's stamp
+    Eigen::Vector3d linear_velocity_mps = Eigen::Vector3d::Zero();     ///< sensor frame
+    Eigen::Vector3d angular_velocity_radps = Eigen::Vector3d::Zero();  ///< sensor frame
+    Matrix6d covariance = Matrix6d::Zero();  ///< of translation (world), then rotation (world, small angles)
+    Eigen::Vector3d gravity_mps2 = Eigen::Vector3d(0.0, 0.0, -9.80665);  ///< world frame, as estimated
+    int iterations = 0;
+    int correspondences = 0;
+    bool keyframe = false;          ///< becomes a keyframe once its moving points have been removed
+    /// Residuals of the scan-to-submap registration: distance of each registered point to its counterpart.
+    AlignedVector<PixelIndex> residual_pixel;
+    AlignedVector<float> residual_m;
+    /// Rows of T_stamp_column by measurement: turns a point of StructuredCloud into the sensor frame at the stamp.
+    AlignedVector<float> deskew[12];  ///< row-major 3 x 4, each [W]
+    /// The deskewed cloud: sensor frame at the stamp; 0, 0, 0 where there is no return.
+    Image<float> x, y, z;
+};
+
+/// Written by detection and tracking.
+struct DetectionResult {
+    std::vector<PixelIndex> pixels;      ///< of all detections, grouped by detection
+    std::vector<Detection> detections;
+    std::vector<Track> tracks;           ///< seen in, or predicted for, this frame
+    Image<std::uint8_t> label;           ///< PixelLabel
+    Image<std::uint32_t> instance;       ///< track id, 0 none
+    int dynamic_points = 0;
+    std::vector<OrientedBox> cleared;    ///< boxes whose past is to be cleared from the maps (Sec. "Dynamic Points Removal")
+
+    /// No detections and no tracks.
+    void clear() {
+        pixels.clear();
+        detections.clear();
+        tracks.clear();
+        cleared.clear();
+        dynamic_points = 0;
+    }
+};
+
+struct Frame {
+    FrameHeader header;
+    RawImages raw;
+    Columns columns;
+    std::vector<ImuSample> imu;  ///< samples that came since the frame before, in time order
+    StructuredCloud cloud;
+    Preparation prepared;
+    OdometryResult odometry;
+    DetectionResult detection;
+
+    /// Allocates everything for a sensor; afterwards no stage needs to allocate.
+    explicit Frame(const SensorModel& sensor);
+};
+
+}  // namespace dlod
