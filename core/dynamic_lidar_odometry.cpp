@@ -15,31 +15,42 @@ DynamicLidarOdometry::DynamicLidarOdometry(const SensorModel& sensor, const Meth
 
 void DynamicLidarOdometry::process(Frame& frame) {
     OdometryFeedback& slot = feedback_[frames_ % kFeedbackDelay];
-    prepare(frame);
+    subsample(frame);
+    remove_ground(frame);
+    segment(frame);
     estimate_pose(frame, frames_ >= kFeedbackDelay ? &slot : nullptr);
-    detect_and_track(frame, slot);
+    detect(frame);
+    track(frame);
+    remove_dynamic_points(frame, slot);
     update_map(frame);
     ++frames_;
 }
 
-void DynamicLidarOdometry::prepare(Frame& frame) {
-    subsampling_.process(frame);
-    ground_removal_.process(frame);
-    segmentation_.process(frame);
+void DynamicLidarOdometry::subsample(Frame& frame) { subsampling_.process(frame); }
+
+void DynamicLidarOdometry::remove_ground(Frame& frame) { ground_removal_.process(frame); }
+
+void DynamicLidarOdometry::segment(Frame& frame) { segmentation_.process(frame); }
+
+void DynamicLidarOdometry::estimate_pose(Frame& frame, const OdometryFeedback* feedback) {
+    odometry_.process(frame, feedback);
 }
 
-void DynamicLidarOdometry::estimate_pose(Frame& frame, const OdometryFeedback* feedback) { odometry_.process(frame, feedback); }
+void DynamicLidarOdometry::detect(Frame& frame) {
+    frame.detection.clear();
+    if (handle_dynamic_objects_ && frame.odometry.valid) detector_.process(frame);
+}
 
-void DynamicLidarOdometry::detect_and_track(Frame& frame, OdometryFeedback& feedback) {
-    if (handle_dynamic_objects_) {
-        detector_.process(frame);
-        tracker_.process(frame);
-    } else {
-        frame.detection.clear();
-    }
+void DynamicLidarOdometry::track(Frame& frame) {
+    if (handle_dynamic_objects_ && frame.odometry.valid) tracker_.process(frame);
+}
+
+void DynamicLidarOdometry::remove_dynamic_points(Frame& frame, OdometryFeedback& feedback) {
     removal_.process(frame, feedback);
 }
 
-void DynamicLidarOdometry::update_map(const Frame& frame) { map_.update(frame); }
+void DynamicLidarOdometry::update_map(const Frame& frame) {
+    if (frame.odometry.valid) map_.update(frame);
+}
 
 }  // namespace dlod

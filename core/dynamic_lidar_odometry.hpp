@@ -10,8 +10,9 @@
 
 namespace dlod {
 
-/// Stages 1 to 4 touch disjoint members: different threads may run them side by side on different frames, as long as
-/// each stage sees the frames in order and the feedback of frame k reaches estimate_pose of frame k + kFeedbackDelay.
+/// Each step touches members of its own: different threads may run different steps side by side on different frames, as
+/// long as each step sees the frames in order, a frame passes the steps in order, and the feedback of the n-th frame
+/// reaches estimate_pose of frame n + kFeedbackDelay.
 class DynamicLidarOdometry {
   public:
     DynamicLidarOdometry(const SensorModel& sensor, const MethodConfig& config);
@@ -19,10 +20,18 @@ class DynamicLidarOdometry {
     /// Everything for one frame whose cloud has been filled by the geometry. Frames in order.
     void process(Frame& frame);
 
-    void prepare(Frame& frame);                                             ///< stage 1: needs no pose
-    void estimate_pose(Frame& frame, const OdometryFeedback* feedback);     ///< stage 2
-    void detect_and_track(Frame& frame, OdometryFeedback& feedback);        ///< stage 3
-    void update_map(const Frame& frame);                                    ///< stage 4
+    // Preparation: needs no pose.
+    void subsample(Frame& frame);
+    void remove_ground(Frame& frame);
+    void segment(Frame& frame);
+    /// Two-stage registration. @param feedback of the frame kFeedbackDelay before, nullptr for the first ones
+    void estimate_pose(Frame& frame, const OdometryFeedback* feedback);
+    // Without a valid pose, or with the handling of dynamic objects off, nothing is detected.
+    void detect(Frame& frame);
+    void track(Frame& frame);
+    /// Labels every pixel and fills `feedback`.
+    void remove_dynamic_points(Frame& frame, OdometryFeedback& feedback);
+    void update_map(const Frame& frame);
 
     GlobalMap& map() { return map_; }
     const Image<float>& residual_image() const { return detector_.residual_image(); }
