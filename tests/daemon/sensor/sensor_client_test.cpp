@@ -1,0 +1,146 @@
+#include "daemon/sensor/sensor_client.hpp"
+
+#include <gtest/gtest.h>
+#include <httplib.h>
+
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <thread>
+
+#include "daemon/sensor/metadata_cache.hpp"
+
+namespace dlod::daemon {
+namespace {
+
+using std::chrono::milliseconds;
+
+/// An Ouster's HTTP side on a loopback port of its own.
+class FakeSensor {
+  public:
+    FakeSensor() {
+        server_.Get("/api/v1/sensor/metadata", [this](const httplib::Request&, httplib::Response& response) {
+            response.status = status;
+            response.set_content(metadata, "application/json");
+        });
+        server_.Post("/api/v1/sensor/config", [this](const httplib::Request& request, httplib::Response& response) {
+            posted = request.body;
+            query = request.get_param_value("reinit") + "," + request.get_param_value("persist");
+            response.status = status;
+        });
+        port_ = server_.bind_to_any_port("127.0.0.1");
+        thread_ = std::thread([this] { server_.listen_after_bind(); });
+        while (!server_.is_running()) std::this_thread::yield();
+    }
+    ~FakeSensor() {
+        server_.stop();
+        thread_.join();
+    }
+    std::string host() const { return "127.0.0.1:" + std::to_string(port_); }
+
+    int status = 200;
+    std::string metadata = R"({"sensor_info": {"status": "RUNNING", "prod_line": "OS-0-128"}})";
+    std::string posted;
+    std::string query;
+
+  private:
+    httplib::Server server_;
+    int port_ = 0;
+    std::thread thread_;
+};
+
+std::string error_of(const SensorClient& client) {
+    try {
+        client.fetch_metadata();
+    } catch (const SensorError& error) {
+        return error.what();
+    }
+    return "";
+}
+
+TEST(SensorClient, FetchesMetadataAsTheyAre) {
+    FakeSensor sensor;
+    EXPECT_EQ(SensorClient(sensor.host()).fetch_metadata(), sensor.metadata);
+}
+
+TEST(SensorClient, ASensorThatStillStartsIsNotReady) {
+    FakeSensor sensor;
+    sensor.metadata = R"({"sensor_info": {"status": "INITIALIZING"}})";
+    EXPECT_NE(error_of(SensorClient(sensor.host())).find("INITIALIZING"), std::string::npos);
+    sensor.metadata = R"({"status": "WARMUP", "prod_line": "OS-1-64"})";
+    EXPECT_NE(error_of(SensorClient(sensor.host())).find("WARMUP"), std::string::npos);
+}
+
+TEST(SensorClient, ErrorsNameHostRequestAndAnswer) {
+    FakeSensor sensor;
+    sensor.status = 503;
+    sensor.metadata = "booting";
+    const std::string error = error_of(SensorClient(sensor.host()));
+    for (const std::string& part :
+         {sensor.host(), std::string("/api/v1/sensor/metadata"), std::string("503"), std::string("booting")}) {
+        EXPECT_NE(error.find(part), std::string::npos) << part << " in: " << error;
+    }
+}
+
+TEST(SensorClient, WhatIsNoOusterIsSaidSo) {
+    FakeSensor sensor;
+    sensor.metadata = "<html>a printer</html>";
+    EXPECT_NE(error_of(SensorClient(sensor.host())).find("JSON"), std::string::npos);
+}
+
+TEST(SensorClient, AnAbsentSensorIsAnErrorWithinTheTimeout) {
+    const auto begin = std::chrono::steady_clock::now();
+    EXPECT_NE(error_of(SensorClient("127.0.0.1:1", milliseconds(300))).find("127.0.0.1:1"), std::string::npos);
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(3));
+}
+
+TEST(SensorClient, SendsOnlyTheSettingsThatAreGiven) {
+    FakeSensor sensor;
+    SensorSettings settings;
+    settings.udp_dest = "@auto";
+    settings.lidar_port = 7512;
+    SensorClient(sensor.host()).apply(settings);
+    EXPECT_EQ(nlohmann::json::parse(sensor.posted), nlohmann::json({{"udp_dest", "@auto"}, {"udp_port_lidar", 7512}}));
+    EXPECT_EQ(sensor.query, "true,false") << "takes effect at once, does not survive a power cycle";
+    sensor.status = 400;
+    EXPECT_THROW(SensorClient(sensor.host()).apply(settings), SensorError);
+}
+
+class MetadataCacheTest : public testing::Test {
+  protected:
+    void SetUp() override {
+        directory_ = std::filesystem::path(testing::TempDir()) / "dlod_metadata_cache";
+        std::filesystem::remove_all(directory_);
+        std::filesystem::create_directories(directory_);
+    }
+    void TearDown() override { std::filesystem::remove_all(directory_); }
+    std::filesystem::path directory_;
+};
+
+TEST_F(MetadataCacheTest, GivesBackWhatWasStoredForThatHost) {
+    const MetadataCache cache(directory_, "os-992.local:80");
+    EXPECT_FALSE(cache.load().has_value());
+    EXPECT_FALSE(cache.store("{\"a\": 1}").has_value());
+    EXPECT_FALSE(cache.store("{\"a\": 2}").has_value());
+    EXPECT_EQ(cache.load(), "{\"a\": 2}");
+    EXPECT_FALSE(MetadataCache(directory_, "os-993.local").load().has_value());
+}
+
+TEST_F(MetadataCacheTest, NoHostNameLeavesTheDirectory) {
+    const MetadataCache cache(directory_, "../../etc/passwd");
+    EXPECT_EQ(cache.path().parent_path(), directory_);
+    EXPECT_FALSE(cache.store("x").has_value());
+    EXPECT_EQ(cache.load(), "x");
+}
+
+TEST_F(MetadataCacheTest, AnUnwritableDirectoryIsAnErrorThatNamesTheFile) {
+    const MetadataCache cache(directory_ / "missing", "host");
+    const auto error = cache.store("x");
+    ASSERT_TRUE(error.has_value());
+    EXPECT_NE(error->find("missing"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace dlod::daemon
