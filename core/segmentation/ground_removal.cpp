@@ -1,7 +1,171 @@
 #include "core/segmentation/ground_removal.hpp"
 
-namespace dlod {
+#include <algorithm>
+#include <cmath>
 
-void GroundRemoval::process(Frame& frame) { frame.prepared.ground.fill(0); }
+#include "core/types/multiversion.hpp"
+
+namespace dlod {
+namespace {
+
+constexpr double kHistogramBin_m = 0.05;
+// Distance over which the line filter's height half forgets: without progress outwards it does not move, so that it
+// does not climb walls.
+constexpr float kHeightMemory_m = 0.1F;
+constexpr float kSlopeGain = 0.2F;
+constexpr float kShortestBase_m = 0.3F;  // returns nearer to each other say nothing about the slope
+constexpr int kRowsAbove = 2;            // slopes are taken over so many rows: between adjacent ones noise prevails
+// Range noise allowed in a slope, as a share of what a wall would rise over those rows.
+constexpr float kNoiseShare = 0.3F;
+
+/// Distance and height of one row of points with respect to the vertical (ux, uy, uz).
+DLOD_MULTIVERSION void cylindrical_row(int width, const float* __restrict x, const float* __restrict y,
+                                       const float* __restrict z, float ux, float uy, float uz, float min_range,
+                                       float* __restrict distance, float* __restrict height) {
+    const float min_squared = min_range * min_range;
+    for (int c = 0; c < width; ++c) {
+        const float h = ux * x[c] + uy * y[c] + uz * z[c];
+        const float squared = x[c] * x[c] + y[c] * y[c] + z[c] * z[c];
+        const float horizontal = squared - h * h;
+        const float d = std::sqrt(horizontal > 1e-6F ? horizontal : 1e-6F);
+        distance[c] = squared > min_squared ? d : 0.0F;
+        height[c] = h;
+    }
+}
+
+struct LineFilterParameters {
+    float max_slope;
+    float height_tolerance;
+    float slope_tolerance;
+    float max_step;
+};
+
+/// One row of all columns' line filters; `above` is kRowsAbove rows up, `wall_rise` what a wall rises to there per
+/// metre of distance.
+DLOD_MULTIVERSION void follow_ground_row(int width, const float* __restrict distance, const float* __restrict height,
+                                         const float* __restrict distance_above, const float* __restrict height_above,
+                                         LineFilterParameters p, float wall_rise, float* __restrict line_distance,
+                                         float* __restrict line_height, float* __restrict line_slope,
+                                         float* __restrict line_started, std::uint8_t* __restrict ground) {
+    for (int c = 0; c < width; ++c) {
+        const float base = distance[c] - line_distance[c];
+        const float predicted = line_height[c] + line_slope[c] * base;
+        const float error = height[c] - predicted;
+        // Flat towards the next return above: then the surface may rise from here (a kerb, the foot of a ramp).
+        const float rise = height_above[c] - height[c];
+        const float run = distance_above[c] - distance[c];
+        const bool flat = (distance_above[c] > 0.0F) & (run > 0.0F) &
+                          (std::abs(rise) < p.max_slope * run + kNoiseShare * wall_rise * distance[c]);
+        const float grown_flat = p.height_tolerance + p.max_slope * base;
+        const float grown_steep = p.height_tolerance + p.slope_tolerance * base;
+        float tolerance = flat ? grown_flat : grown_steep;
+        tolerance = tolerance < p.max_step ? tolerance : p.max_step;
+        // Nothing stands below the ground: downwards the line may bend more.
+        const float below = 2.0F * p.height_tolerance + p.max_slope * base;
+        const bool started = line_started[c] > 0.0F;
+        const bool on_line =
+            (distance[c] > 0.0F) & (base > -0.05F) & (error < tolerance) & (error > -below) & (started | flat);
+        const float arm = base > kShortestBase_m ? base : kShortestBase_m;
+        const float progress = base > 0.0F ? base : 0.0F;
+        const float height_gain = progress / (progress + kHeightMemory_m);
+        float slope = line_slope[c] + kSlopeGain * error / arm;
+        slope = slope < p.max_slope ? slope : p.max_slope;
+        slope = slope > -p.max_slope ? slope : -p.max_slope;
+        line_distance[c] = on_line ? distance[c] : line_distance[c];
+        line_height[c] = on_line ? predicted + height_gain * error : line_height[c];
+        line_slope[c] = on_line ? slope : line_slope[c];
+        line_started[c] = on_line ? 1.0F : line_started[c];
+        ground[c] = on_line ? 1 : 0;
+    }
+}
+
+}  // namespace
+
+GroundRemoval::GroundRemoval(const SensorModel& sensor, const GroundRemovalConfig& config)
+    : sensor_(sensor), config_(config), distance_(sensor.height, sensor.width), height_(sensor.height, sensor.width) {
+    const auto width = static_cast<std::size_t>(sensor.width);
+    for (auto* v : {&line_distance_, &line_height_, &line_slope_, &line_started_}) v->assign(width, 0.0F);
+    for (std::size_t r = 0; r < static_cast<std::size_t>(sensor.height); ++r) {
+        const std::size_t above = r < kRowsAbove ? 0 : r - kRowsAbove;
+        wall_rise_.push_back(std::abs(std::tan(sensor.altitude_rad[above]) - std::tan(sensor.altitude_rad[r])));
+    }
+    const double span = std::max(0.0, config.max_sensor_height_m - config.min_sensor_height_m);
+    histogram_.assign(static_cast<std::size_t>(span / kHistogramBin_m) + 2, 0);
+}
+
+void GroundRemoval::update_up(const Frame& frame) {
+    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+    for (const ImuSample& sample : frame.imu) sum += sample.acceleration_mps2;
+    const Eigen::Vector3f mean = sensor_.T_sensor_imu.linear().cast<float>() *
+                                 (frame.imu.empty() ? sum : sum / static_cast<float>(frame.imu.size()));
+    // A reading far from 1 g is a shock or a faulty IMU: the vertical of the frame before stays.
+    if (std::abs(mean.norm() - 9.81F) < 2.0F) up_ = mean.normalized();
+}
+
+void GroundRemoval::update_sensor_height() {
+    // Height of the lowest well populated level of flat returns around the sensor.
+    std::fill(histogram_.begin(), histogram_.end(), 0);
+    const auto max_slope = static_cast<float>(std::tan(config_.max_slope_rad));
+    constexpr int kColumnStep = 4;
+    for (int r = sensor_.height - 1; r >= kRowsAbove; --r) {
+        if (sensor_.altitude_rad[static_cast<std::size_t>(r)] > 0.2F) continue;
+        const float* distance = distance_.row(r);
+        const float* height = height_.row(r);
+        const float* distance_above = distance_.row(r - kRowsAbove);
+        const float* height_above = height_.row(r - kRowsAbove);
+        const float wall_rise = wall_rise_[static_cast<std::size_t>(r)];
+        for (int c = 0; c < sensor_.width; c += kColumnStep) {
+            const float run = distance_above[c] - distance[c];
+            if (distance[c] == 0.0F || distance_above[c] == 0.0F || run <= 0.0F || distance[c] > 15.0F) continue;
+            if (std::abs(height_above[c] - height[c]) > max_slope * run + kNoiseShare * wall_rise * distance[c])
+                continue;
+            const double below = -static_cast<double>(height[c]) - config_.min_sensor_height_m;
+            if (below < 0.0) continue;
+            const auto bin = static_cast<std::size_t>(below / kHistogramBin_m);
+            if (bin + 1 < histogram_.size()) ++histogram_[bin];
+        }
+    }
+    const auto level = [this](std::size_t bin) { return histogram_[bin] + histogram_[bin + 1]; };
+    int most = 0;
+    for (std::size_t bin = 0; bin + 1 < histogram_.size(); ++bin) most = std::max(most, level(bin));
+    constexpr int kFewest = 16;
+    if (most < kFewest) return;
+    for (std::size_t bin = histogram_.size() - 1; bin-- > 0;) {
+        if (level(bin) * 5 < most * 2) continue;
+        if (bin > 0 && level(bin - 1) > level(bin)) --bin;
+        const double weight = level(bin);
+        sensor_height_m_ =
+            config_.min_sensor_height_m +
+            kHistogramBin_m * (static_cast<double>(bin) + 0.5 + static_cast<double>(histogram_[bin + 1]) / weight);
+        return;
+    }
+}
+
+void GroundRemoval::process(Frame& frame) {
+    update_up(frame);
+    const StructuredCloud& cloud = frame.cloud;
+    for (int r = 0; r < sensor_.height; ++r) {
+        cylindrical_row(sensor_.width, cloud.x.row(r), cloud.y.row(r), cloud.z.row(r), up_.x(), up_.y(), up_.z(),
+                        static_cast<float>(config_.min_range_m), distance_.row(r), height_.row(r));
+    }
+    update_sensor_height();
+    if (sensor_height_m_ == 0.0) {
+        frame.prepared.ground.fill(0);
+        return;
+    }
+    std::fill(line_distance_.begin(), line_distance_.end(), 0.0F);
+    std::fill(line_height_.begin(), line_height_.end(), static_cast<float>(-sensor_height_m_));
+    std::fill(line_slope_.begin(), line_slope_.end(), 0.0F);
+    std::fill(line_started_.begin(), line_started_.end(), 0.0F);
+    const LineFilterParameters parameters{
+        static_cast<float>(std::tan(config_.max_slope_rad)), static_cast<float>(config_.height_tolerance_m),
+        static_cast<float>(config_.slope_tolerance), static_cast<float>(config_.max_step_m)};
+    for (int r = sensor_.height - 1; r >= 0; --r) {
+        const int above = std::max(r - kRowsAbove, 0);
+        follow_ground_row(sensor_.width, distance_.row(r), height_.row(r), distance_.row(above), height_.row(above),
+                          parameters, wall_rise_[static_cast<std::size_t>(r)], line_distance_.data(),
+                          line_height_.data(), line_slope_.data(), line_started_.data(), frame.prepared.ground.row(r));
+    }
+}
 
 }  // namespace dlod

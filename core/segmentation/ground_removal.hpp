@@ -1,5 +1,11 @@
 // Coarse ground removal on the range image (paper, Sec. "Range Image-based Segmentation", after LeGO-LOAM).
+//
+// Each image column is walked from the lowest beam outwards while a line filter (height and slope) follows the ground:
+// a return is ground when it continues that line. Slopes, ramps and kerbs are followed, walls, legs, roofs and ceilings
+// are not; all columns advance together, row by row.
 #pragma once
+
+#include <Eigen/Core>
 
 #include "core/types/frame.hpp"
 #include "core/types/parameter.hpp"
@@ -8,22 +14,57 @@ namespace dlod {
 
 struct GroundRemovalConfig {
     double max_slope_rad = 0.1745;
+    double height_tolerance_m = 0.05;
+    double slope_tolerance = 0.05;
+    double max_step_m = 0.35;
+    double min_sensor_height_m = 0.25;
+    double max_sensor_height_m = 3.5;
+    double min_range_m = 0.5;
 
     template <class V>
     void visit(V& v) {
-        v.parameter("max_slope_rad", max_slope_rad, Range{0.01, 0.8}, "rad", "steepest slope between vertical neighbours that still counts as ground");
+        v.parameter("max_slope_rad", max_slope_rad, Range{0.01, 0.8}, "rad",
+                    "steepest slope between vertical neighbours that still counts as ground");
+        v.parameter(
+            "height_tolerance_m", height_tolerance_m, Range{0.01, 0.5}, "m",
+            "height above the followed ground up to which a return is ground; higher eats feet, lower leaves grass");
+        v.parameter("slope_tolerance", slope_tolerance, Range{0.0, 0.5}, "1",
+                    "growth of that tolerance per metre since the last ground return of the column");
+        v.parameter("max_step_m", max_step_m, Range{0.05, 1.0}, "m", "bound of the grown tolerance");
+        v.parameter("min_sensor_height_m", min_sensor_height_m, Range{0.05, 10.0}, "m",
+                    "lowest mounting height looked for");
+        v.parameter("max_sensor_height_m", max_sensor_height_m, Range{0.1, 20.0}, "m",
+                    "greatest mounting height looked for");
+        v.parameter("min_range_m", min_range_m, Range{0.0, 10.0}, "m",
+                    "nearer returns (the robot itself) are never ground");
     }
 };
 
-/// Fills frame.prepared.ground from frame.cloud. Needs no pose.
+/// Fills frame.prepared.ground from frame.cloud; the vertical comes from the frame's IMU samples, without any from the
+/// sensor's z axis. Needs no pose.
 class GroundRemoval {
   public:
-    GroundRemoval(const SensorModel& sensor, const GroundRemovalConfig& config) : sensor_(sensor), config_(config) {}
+    GroundRemoval(const SensorModel& sensor, const GroundRemovalConfig& config);
     void process(Frame& frame);
 
+    /// Height of the sensor above the ground around it, metres, as found in the last frame.
+    double sensor_height_m() const { return sensor_height_m_; }
+    /// Unit vector away from the ground, sensor frame, as used in the last frame.
+    const Eigen::Vector3f& up() const { return up_; }
+
   private:
+    void update_up(const Frame& frame);
+    void update_sensor_height();
+
     SensorModel sensor_;
     GroundRemovalConfig config_;
+    Eigen::Vector3f up_ = Eigen::Vector3f::UnitZ();
+    double sensor_height_m_ = 0.0;
+    Image<float> distance_;  ///< horizontal distance from the sensor; 0: no return, or too near
+    Image<float> height_;    ///< along up_, above the sensor
+    AlignedVector<float> line_distance_, line_height_, line_slope_, line_started_;  ///< [W] the columns' line filters
+    AlignedVector<float> wall_rise_;  ///< [H] difference of the beams' tangents to the row that slopes are taken to
+    AlignedVector<int> histogram_;
 };
 
 }  // namespace dlod

@@ -1,11 +1,166 @@
 #include "core/segmentation/range_image_segmentation.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "core/types/multiversion.hpp"
+
 namespace dlod {
+namespace {
+
+DLOD_MULTIVERSION void select_row(int width, const float* __restrict range, const std::uint8_t* __restrict ground,
+                                  float min_range, float max_range, float* __restrict selected) {
+    for (int c = 0; c < width; ++c) {
+        const bool use = (ground[c] == 0) & (range[c] >= min_range) & (range[c] <= max_range);
+        selected[c] = use ? range[c] : 0.0F;
+    }
+}
+
+/// The angle criterion between corresponding pixels of a and b: far <= ratio * near, which is beta >= theta (see
+/// ratio_of).
+DLOD_MULTIVERSION void connect_row(int width, const float* __restrict a, const float* __restrict b, float ratio,
+                                   float max_step, std::uint8_t* __restrict connected) {
+    for (int c = 0; c < width; ++c) {
+        const float near = a[c] < b[c] ? a[c] : b[c];
+        const float far = a[c] < b[c] ? b[c] : a[c];
+        connected[c] = ((near > 0.0F) & (far <= ratio * near) & (far - near <= max_step)) ? 1 : 0;
+    }
+}
+
+/// Bogoslavskyi's beta = atan2(near sin(alpha), far - near cos(alpha)) > theta, solved for far / near.
+float ratio_of(double alpha_rad, double theta_rad) {
+    return static_cast<float>(std::cos(alpha_rad) + std::sin(alpha_rad) / std::tan(theta_rad));
+}
+
+}  // namespace
+
+RangeImageSegmentation::RangeImageSegmentation(const SensorModel& sensor, const SegmentationConfig& config)
+    : sensor_(sensor),
+      config_(config),
+      ratio_right_(ratio_of(2.0 * std::numbers::pi / sensor.width, config.angle_threshold_rad)),
+      range_(sensor.height, sensor.width) {
+    const auto width = static_cast<std::size_t>(sensor.width);
+    for (std::size_t r = 0; r + 1 < static_cast<std::size_t>(sensor.height); ++r) {
+        const double alpha =
+            std::abs(static_cast<double>(sensor.altitude_rad[r]) - static_cast<double>(sensor.altitude_rad[r + 1]));
+        ratio_down_.push_back(ratio_of(alpha, config.angle_threshold_rad));
+    }
+    right_.assign(width, 0);
+    down_.assign(width, 0);
+    run_above_.assign(width, 0);
+    run_here_.assign(width, 0);
+    runs_.reserve(sensor.pixels());
+    points_.reserve(sensor.pixels());
+    next_pixel_.reserve(4096);
+    last_row_.reserve(4096);
+}
+
+std::uint32_t RangeImageSegmentation::find(std::uint32_t run) {
+    while (runs_[run].parent != run) {
+        runs_[run].parent = runs_[runs_[run].parent].parent;
+        run = runs_[run].parent;
+    }
+    return run;
+}
+
+void RangeImageSegmentation::unite(std::uint32_t a, std::uint32_t b) {
+    a = find(a);
+    b = find(b);
+    if (a == b) return;
+    if (b < a) std::swap(a, b);
+    runs_[b].parent = a;
+}
+
+void RangeImageSegmentation::connect(const Frame& frame) {
+    const int width = sensor_.width;
+    const auto max_step = static_cast<float>(config_.max_depth_step_m);
+    runs_.clear();
+    for (int r = 0; r < sensor_.height; ++r) {
+        float* range = range_.row(r);
+        select_row(width, frame.cloud.range_m.row(r), frame.prepared.ground.row(r),
+                   static_cast<float>(config_.min_range_m), static_cast<float>(config_.max_range_m), range);
+        connect_row(width - 1, range, range + 1, ratio_right_, max_step, right_.data());
+        connect_row(1, range + width - 1, range, ratio_right_, max_step, right_.data() + width - 1);
+        const auto row_begin = static_cast<std::uint32_t>(runs_.size());
+        for (int c = 0; c < width; ++c) {
+            if (range[c] == 0.0F) continue;
+            const auto run = static_cast<std::uint32_t>(runs_.size());
+            const int first = c;
+            run_here_[static_cast<std::size_t>(c)] = run;
+            while (c + 1 < width && right_[static_cast<std::size_t>(c)] != 0)
+                run_here_[static_cast<std::size_t>(++c)] = run;
+            runs_.push_back({run, 0, static_cast<std::uint16_t>(r), static_cast<std::uint16_t>(first),
+                             static_cast<std::uint16_t>(c)});
+        }
+        if (right_.back() != 0) unite(row_begin, static_cast<std::uint32_t>(runs_.size()) - 1);
+        if (r > 0) {
+            connect_row(width, range_.row(r - 1), range, ratio_down_[static_cast<std::size_t>(r - 1)], max_step,
+                        down_.data());
+            std::uint32_t above = ~0U;
+            std::uint32_t here = ~0U;
+            for (std::size_t c = 0; c < static_cast<std::size_t>(width); ++c) {
+                if (down_[c] == 0 || (run_above_[c] == above && run_here_[c] == here)) continue;
+                above = run_above_[c];
+                here = run_here_[c];
+                unite(above, here);
+            }
+        }
+        run_above_.swap(run_here_);
+    }
+}
+
+void RangeImageSegmentation::collect(Preparation& prepared, const StructuredCloud& cloud) {
+    points_.assign(runs_.size(), 0);
+    for (std::uint32_t i = 0; i < runs_.size(); ++i) {
+        runs_[i].parent = find(i);
+        points_[runs_[i].parent] += static_cast<std::uint32_t>(runs_[i].last - runs_[i].first) + 1U;
+    }
+    prepared.segments.clear();
+    prepared.segment.fill(0);
+    next_pixel_.clear();
+    std::uint32_t pixels = 0;
+    for (std::uint32_t i = 0; i < runs_.size(); ++i) {
+        if (runs_[i].parent != i || points_[i] < static_cast<std::uint32_t>(config_.min_points)) continue;
+        Segment& segment = prepared.segments.emplace_back();
+        segment.first = pixels;
+        segment.count = points_[i];
+        segment.min_m.setConstant(1e9F);
+        segment.max_m.setConstant(-1e9F);
+        runs_[i].segment = static_cast<std::uint32_t>(prepared.segments.size());
+        next_pixel_.push_back(pixels);
+        pixels += points_[i];
+    }
+    prepared.pixels.resize(pixels);
+    // Runs come in row order: a segment's row is new where it differs from its last one.
+    last_row_.assign(prepared.segments.size(), ~0U);
+    for (const Run& run : runs_) {
+        const std::uint32_t label = runs_[run.parent].segment;
+        if (label == 0) continue;
+        Segment& segment = prepared.segments[label - 1];
+        if (last_row_[label - 1] != run.row) {
+            last_row_[label - 1] = run.row;
+            ++segment.rows;
+        }
+        const std::size_t begin = static_cast<std::size_t>(run.row) * static_cast<std::size_t>(sensor_.width);
+        std::uint32_t next = next_pixel_[label - 1];
+        for (std::size_t p = begin + run.first; p <= begin + run.last; ++p) {
+            prepared.segment[p] = label;
+            prepared.pixels[next++] = static_cast<PixelIndex>(p);
+            const Eigen::Vector3f point(cloud.x[p], cloud.y[p], cloud.z[p]);
+            segment.min_m = segment.min_m.cwiseMin(point);
+            segment.max_m = segment.max_m.cwiseMax(point);
+            segment.max_range_m = std::max(segment.max_range_m, cloud.range_m[p]);
+        }
+        next_pixel_[label - 1] = next;
+    }
+    for (Segment& segment : prepared.segments) segment.feasible = is_feasible(segment, config_.feasibility);
+}
 
 void RangeImageSegmentation::process(Frame& frame) {
-    frame.prepared.segment.fill(0);
-    frame.prepared.segments.clear();
-    frame.prepared.pixels.clear();
+    connect(frame);
+    collect(frame.prepared, frame.cloud);
 }
 
 }  // namespace dlod
