@@ -1,0 +1,53 @@
+#include "tools/eval/run_output.hpp"
+
+#include <stdexcept>
+
+#include "tools/eval/csv_table.hpp"
+
+namespace dlod::tools {
+namespace {
+
+DynamicState state_from(std::string_view text, const std::filesystem::path& file) {
+    if (text == "undefined") return DynamicState::kUndefined;
+    if (text == "static") return DynamicState::kStatic;
+    if (text == "dynamic") return DynamicState::kDynamic;
+    throw std::runtime_error(file.string() + ": unknown state " + std::string(text));
+}
+
+std::map<std::int64_t, std::vector<Track>> read_tracks(const std::filesystem::path& path) {
+    const CsvTable table(path);
+    const auto at = [&](std::size_t row, const char* name) { return table.number(row, table.column(name)); };
+    const auto count = [&](std::size_t row, const char* name) {
+        return static_cast<int>(table.integer(row, table.column(name)));
+    };
+    std::map<std::int64_t, std::vector<Track>> tracks;
+    for (std::size_t row = 0; row < table.rows(); ++row) {
+        Track track;
+        track.id = static_cast<std::uint32_t>(table.integer(row, table.column("id")));
+        track.state = state_from(table.text(row, table.column("state")), path);
+        track.box.center_m = {at(row, "x"), at(row, "y"), at(row, "z")};
+        track.box.yaw_rad = at(row, "yaw");
+        track.box.size_m = {at(row, "length"), at(row, "width"), at(row, "height")};
+        track.velocity_mps = {at(row, "vx"), at(row, "vy"), at(row, "vz")};
+        track.points = count(row, "points");
+        track.hits = count(row, "hits");
+        track.residual_m = at(row, "residual");
+        tracks[table.integer(row, table.column("seq"))].push_back(track);
+    }
+    return tracks;
+}
+
+}  // namespace
+
+RunOutput::RunOutput(const std::filesystem::path& run_folder)
+    : folder(run_folder), trajectory(read_tum(folder / "trajectory.tum")) {
+    const CsvTable table(folder / "frames.csv");
+    const auto seq = table.column("seq");
+    const auto stamp = table.column("stamp_ns");
+    for (std::size_t row = 0; row < table.rows(); ++row)
+        frames.push_back({table.integer(row, seq), table.integer(row, stamp)});
+    has_tracks = std::filesystem::exists(folder / "tracks.csv");
+    if (has_tracks) tracks = read_tracks(folder / "tracks.csv");
+}
+
+}  // namespace dlod::tools
