@@ -71,7 +71,9 @@ NetworkLayer behind_family(Bytes frame) {
     return NetworkLayer{.fault = IpFault::kNone, .vlan = 0, .ip = frame.subspan(4)};
 }
 
-IpAddress mapped_ipv4(Bytes four) { return ipv4_address(u8(four, 0), u8(four, 1), u8(four, 2), u8(four, 3)); }
+IpAddress mapped_ipv4(Bytes four) {
+    return ipv4_address(u8(four, 0), u8(four, 1), u8(four, 2), u8(four, 3));
+}
 
 IpPacket ip_fault(IpFault f) {
     IpPacket p;

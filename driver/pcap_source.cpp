@@ -11,6 +11,9 @@
 namespace dlod::driver {
 namespace {
 
+/// Damaged captures have times that nanoseconds in 64 bits cannot hold.
+constexpr std::int64_t kLatestSecond = std::int64_t{1} << 32;
+
 std::string link_type_name(int link_type) {
     const char* name = pcap_datalink_val_to_name(link_type);
     return std::to_string(link_type) + (name != nullptr ? std::string(" (") + name + ")" : "");
@@ -51,7 +54,8 @@ PacketBatch PcapSource::next() {
         if (result != 1) return finish(result);
         ++counters_.records;
         // Nanosecond precision was asked for: tv_usec has nanoseconds.
-        const std::int64_t time_ns = std::int64_t{header->ts.tv_sec} * 1'000'000'000 + header->ts.tv_usec;
+        const std::int64_t seconds = std::clamp<std::int64_t>(header->ts.tv_sec, 0, kLatestSecond);
+        const std::int64_t time_ns = seconds * 1'000'000'000 + header->ts.tv_usec;
         if (take_record(std::as_bytes(std::span(bytes, header->caplen)), header->len, time_ns)) {
             ++counters_.delivered;
             return {.status = SourceStatus::kPackets, .packets = std::span(&packet_, 1)};

@@ -9,6 +9,8 @@
 #include <cstring>
 #include <span>
 
+#include "driver/network_address.hpp"
+
 namespace dlod::driver {
 namespace {
 
@@ -55,10 +57,6 @@ class Cursor {
   private:
     std::byte* at_;
 };
-
-bool unspecified(const IpAddress& a) {
-    return std::all_of(a.begin(), a.end(), [](std::byte b) { return b == std::byte{0}; });
-}
 
 }  // namespace
 
@@ -135,9 +133,9 @@ bool PcapWriter::write(const Packet& packet) noexcept {
     if (packet.data.size() > kLargestPayload) return fail("cannot hold a datagram of this size", EMSGSIZE);
 
     Datagram d;
-    d.ipv4 = is_ipv4(packet.sender_address) || unspecified(packet.sender_address);
+    d.ipv4 = is_ipv4(packet.sender_address) || is_unspecified(packet.sender_address);
     d.destination = d.ipv4 ? options_.destination_ipv4 : options_.destination_ipv6;
-    d.source = unspecified(packet.sender_address) ? d.destination : packet.sender_address;
+    d.source = is_unspecified(packet.sender_address) ? d.destination : packet.sender_address;
     d.id = next_id_++;
     d.time_ns = packet.receive_ns;
     d.payload = packet.data;
