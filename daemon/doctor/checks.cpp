@@ -1,0 +1,187 @@
+#include "daemon/doctor/checks.hpp"
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sched.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/statvfs.h>
+#include <sys/timex.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <regex>
+#include <string>
+
+#include "daemon/sensor/sensor_client.hpp"
+
+namespace dlod::daemon {
+namespace {
+
+using Verdict = Check::Verdict;
+
+/// A socket that closes itself.
+class Socket {
+  public:
+    Socket() : descriptor_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {}
+    ~Socket() {
+        if (descriptor_ >= 0) ::close(descriptor_);
+    }
+    Socket(const Socket&) = delete;
+    Socket& operator=(const Socket&) = delete;
+    int get() const { return descriptor_; }
+
+  private:
+    int descriptor_;
+};
+
+std::string megabytes(std::uint64_t bytes) {
+    return std::to_string(bytes >> 20U) + " MiB";
+}
+
+}  // namespace
+
+Check check_receive_buffer(int wanted_bytes) {
+    Check check{"receive buffer", Verdict::kGood, "", ""};
+    const Socket socket;
+    ::setsockopt(socket.get(), SOL_SOCKET, SO_RCVBUF, &wanted_bytes, sizeof wanted_bytes);
+    int granted = 0;
+    socklen_t length = sizeof granted;
+    if (::getsockopt(socket.get(), SOL_SOCKET, SO_RCVBUF, &granted, &length) != 0) {
+        return {check.name, Verdict::kFailure, std::string("no UDP socket: ") + std::strerror(errno),
+                "allow AF_INET sockets"};
+    }
+    granted /= 2;  // the kernel doubles what it is asked for, socket(7)
+    check.finding = std::to_string(granted) + " of " + std::to_string(wanted_bytes) + " bytes granted";
+    if (granted < wanted_bytes) {
+        check.verdict = Verdict::kWarning;
+        check.remedy = "sudo sysctl -w net.core.rmem_max=" + std::to_string(wanted_bytes);
+    }
+    return check;
+}
+
+Check check_multicast(const std::string& lcm_url) {
+    Check check{"LCM multicast", Verdict::kGood, "", ""};
+    static const std::regex kUdpm(R"(udpm://([0-9.]+):([0-9]+)(?:\?(?:.*&)?ttl=([0-9]+).*)?(?:\?.*)?)");
+    std::smatch match;
+    in_addr group{};
+    if (!std::regex_match(lcm_url, match, kUdpm) || ::inet_pton(AF_INET, match[1].str().c_str(), &group) != 1 ||
+        !IN_MULTICAST(ntohl(group.s_addr))) {
+        return {check.name, Verdict::kWarning, "'" + lcm_url + "' is no multicast URL: nothing to check",
+                "lcm.url: udpm://239.255.76.67:7667?ttl=1"};
+    }
+    const int ttl = match[3].matched ? std::stoi(match[3].str().substr(0, 4)) : 0;
+    const Socket socket;
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr = group;
+    address.sin_port = htons(static_cast<std::uint16_t>(std::stoul(match[2].str().substr(0, 6))));
+    if (::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+        return {check.name, Verdict::kFailure, "no route to " + match[1].str() + ": " + std::strerror(errno),
+                "sudo ip route add 224.0.0.0/4 dev INTERFACE (with no network: sudo ip link set lo multicast on; "
+                "sudo ip route add 224.0.0.0/4 dev lo)"};
+    }
+    sockaddr_in local{};
+    socklen_t length = sizeof local;
+    ::getsockname(socket.get(), reinterpret_cast<sockaddr*>(&local), &length);
+    char text[INET_ADDRSTRLEN] = "";
+    ::inet_ntop(AF_INET, &local.sin_addr, text, sizeof text);
+    check.finding = "messages leave by " + std::string(text) + " with ttl " + std::to_string(ttl);
+    if (ttl == 0) {
+        check.finding += ": they stay on this host";
+        check.remedy = "for subscribers on other hosts: lcm.url with ?ttl=1";
+    }
+    return check;
+}
+
+Check check_realtime_priority(int priority) {
+    Check check{"real-time priority", Verdict::kGood, "", ""};
+    if (priority == 0) {
+        check.finding = "not configured";
+        return check;
+    }
+    sched_param before{};
+    int policy = ::sched_getscheduler(0);
+    ::sched_getparam(0, &before);
+    sched_param wanted{};
+    wanted.sched_priority = priority;
+    if (::sched_setscheduler(0, SCHED_FIFO, &wanted) != 0) {
+        return {check.name, Verdict::kWarning,
+                "SCHED_FIFO " + std::to_string(priority) + " refused: " + std::strerror(errno),
+                "run as the systemd service, or: sudo prlimit --rtprio=" + std::to_string(priority) + " --pid $$"};
+    }
+    ::sched_setscheduler(0, policy, &before);
+    check.finding = "SCHED_FIFO " + std::to_string(priority) + " granted";
+    return check;
+}
+
+Check check_locked_memory(bool configured) {
+    Check check{"locked memory", Verdict::kGood, "", ""};
+    if (!configured) {
+        check.finding = "not configured";
+        return check;
+    }
+    rlimit limit{};
+    ::getrlimit(RLIMIT_MEMLOCK, &limit);
+    constexpr rlim_t kNeeded = 512U << 20U;
+    if (limit.rlim_cur != RLIM_INFINITY && limit.rlim_cur < kNeeded && ::geteuid() != 0) {
+        return {check.name, Verdict::kWarning, "only " + megabytes(limit.rlim_cur) + " may be locked",
+                "LimitMEMLOCK=infinity in the service, or: sudo prlimit --memlock=unlimited --pid $$"};
+    }
+    check.finding = "allowed";
+    return check;
+}
+
+Check check_clock_synchronised() {
+    Check check{"clock", Verdict::kGood, "", ""};
+    timex state{};
+    const int result = ::adjtimex(&state);
+    if (result == -1 || result == TIME_ERROR || (state.status & STA_UNSYNC) != 0) {
+        return {check.name, Verdict::kWarning, "not synchronised: stamps will not agree with other hosts'",
+                "sudo timedatectl set-ntp true (or chrony, or ptp4l with phc2sys)"};
+    }
+    check.finding = "synchronised, estimated error " + std::to_string(state.esterror) + " us";
+    return check;
+}
+
+Check check_disk(const std::filesystem::path& directory, std::uint64_t wanted_bytes) {
+    Check check{"disk", Verdict::kGood, "", ""};
+    struct statvfs space {};
+    if (::statvfs(directory.c_str(), &space) != 0) {
+        return {check.name, Verdict::kFailure, directory.string() + ": " + std::strerror(errno),
+                "sudo mkdir -p " + directory.string()};
+    }
+    if (::access(directory.c_str(), W_OK) != 0) {
+        return {check.name, Verdict::kFailure, directory.string() + " is not writable",
+                "sudo chown $USER " + directory.string() + " (the service has a directory of its own)"};
+    }
+    const std::uint64_t free_bytes = static_cast<std::uint64_t>(space.f_bavail) * space.f_frsize;
+    check.finding = megabytes(free_bytes) + " free in " + directory.string();
+    if (free_bytes < wanted_bytes) {
+        check.verdict = Verdict::kWarning;
+        check.remedy =
+            "free at least " + megabytes(wanted_bytes) + " in " + directory.string() + ", or record fewer files";
+    }
+    return check;
+}
+
+Check check_sensor(const std::string& host) {
+    Check check{"sensor", Verdict::kGood, "", ""};
+    if (host.empty()) {
+        check.finding = "sensor.host not configured: metadata come from a file";
+        return check;
+    }
+    try {
+        SensorClient(host, std::chrono::seconds(2)).fetch_metadata();
+        check.finding = host + " answers";
+    } catch (const SensorError& error) {
+        check.verdict = Verdict::kFailure;
+        check.finding = error.what();
+        check.remedy = "ping " + host + "; check power, cable and the address in sensor.host";
+    }
+    return check;
+}
+
+}  // namespace dlod::daemon

@@ -1,0 +1,60 @@
+#include "daemon/doctor/checks.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+namespace dlod::daemon {
+namespace {
+
+using Verdict = Check::Verdict;
+
+TEST(DoctorChecks, ASmallReceiveBufferIsGrantedAndAHugeOneIsMendedBySysctl) {
+    EXPECT_EQ(check_receive_buffer(4096).verdict, Verdict::kGood);
+    const Check huge = check_receive_buffer(1 << 30);
+    EXPECT_EQ(huge.verdict, Verdict::kWarning);
+    EXPECT_NE(huge.remedy.find("net.core.rmem_max=1073741824"), std::string::npos);
+}
+
+TEST(DoctorChecks, MulticastOfNoMulticastUrlIsNamed) {
+    for (const char* url : {"none", "udpm://192.168.1.1:7667", "udpm://239.255.76.67", "memq://"}) {
+        const Check check = check_multicast(url);
+        EXPECT_EQ(check.verdict, Verdict::kWarning) << url;
+        EXPECT_NE(check.finding.find(url), std::string::npos);
+    }
+}
+
+TEST(DoctorChecks, MulticastHasARouteOrNamesTheCommand) {
+    const Check check = check_multicast("udpm://239.255.76.67:7667?ttl=1");
+    if (check.verdict == Verdict::kFailure) {
+        EXPECT_NE(check.remedy.find("ip route add 224.0.0.0/4"), std::string::npos);
+    } else {
+        EXPECT_NE(check.finding.find("ttl 1"), std::string::npos);
+    }
+}
+
+TEST(DoctorChecks, WhatIsNotConfiguredIsGood) {
+    EXPECT_EQ(check_realtime_priority(0).verdict, Verdict::kGood);
+    EXPECT_EQ(check_locked_memory(false).verdict, Verdict::kGood);
+    EXPECT_EQ(check_sensor("").verdict, Verdict::kGood);
+}
+
+TEST(DoctorChecks, DiskTellsMissingAndFull) {
+    EXPECT_EQ(check_disk("/nonexistent/state", 1).verdict, Verdict::kFailure);
+    const auto here = std::filesystem::temp_directory_path();
+    EXPECT_EQ(check_disk(here, 1).verdict, Verdict::kGood);
+    const Check full = check_disk(here, UINT64_MAX);
+    EXPECT_EQ(full.verdict, Verdict::kWarning);
+    EXPECT_NE(full.remedy.find(here.string()), std::string::npos);
+}
+
+TEST(DoctorChecks, AnAbsentSensorIsAFailureWithItsHost) {
+    const Check check = check_sensor("127.0.0.1:1");
+    EXPECT_EQ(check.verdict, Verdict::kFailure);
+    EXPECT_NE(check.finding.find("127.0.0.1:1"), std::string::npos);
+    EXPECT_FALSE(check.remedy.empty());
+}
+
+}  // namespace
+}  // namespace dlod::daemon
