@@ -1,0 +1,38 @@
+// The subcommands of dlod. Each returns the exit code, prints results to stdout and what goes wrong to stderr, and
+// throws the errors that main() turns into exit codes.
+#pragma once
+
+#include "daemon/commands/exit_code.hpp"
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace dlod::daemon {
+
+/// How a command comes to its configuration: later entries win over earlier ones and over the preset.
+struct ConfigSources {
+    std::optional<std::filesystem::path> file;
+    std::vector<std::string> settings;  ///< "key=value"
+};
+
+struct ReplayArguments {
+    std::filesystem::path capture;
+    std::optional<std::filesystem::path> metadata;  ///< the capture's name with .json
+    ConfigSources config;
+    double rate = 0.0;  ///< 0: as fast as possible, 1: true rate
+};
+
+struct RunArguments {
+    ConfigSources config;
+};
+
+ExitCode replay(const ReplayArguments& arguments);
+ExitCode run(const RunArguments& arguments);
+/// Sensor, profile, packets, frames, losses and duration of a capture; of a metadata file the sensor alone.
+ExitCode info(const std::filesystem::path& file, const std::optional<std::filesystem::path>& metadata);
+ExitCode check_config(const ConfigSources& config, const std::optional<std::filesystem::path>& metadata);
+ExitCode print_config(const ConfigSources& config, const std::optional<std::filesystem::path>& metadata);
+
+}  // namespace dlod::daemon

@@ -1,0 +1,133 @@
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <utility>
+
+#include "daemon/commands/commands.hpp"
+#include "daemon/commands/load_config.hpp"
+#include "daemon/output/result_writer.hpp"
+#include "daemon/pipeline/pipeline.hpp"
+#include "daemon/service/signals.hpp"
+#include "driver/pcap_source.hpp"
+
+namespace dlod::daemon {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// A line on a terminal that shows how far the replay is; nothing elsewhere.
+class ProgressBar {
+  public:
+    void show(double share, std::uint64_t frames, double seconds) {
+        if (!terminal_) return;
+        constexpr int kWidth = 40;
+        const int filled = static_cast<int>(share * kWidth);
+        std::fprintf(stderr, "\r[%.*s%*s] %3.0f %%  %llu frames  %.0f/s ", filled, "########################################",
+                     kWidth - filled, "", 100.0 * share, static_cast<unsigned long long>(frames),
+                     seconds > 0.0 ? static_cast<double>(frames) / seconds : 0.0);
+    }
+    void finish() {
+        if (terminal_) std::fputs("\n", stderr);
+    }
+
+  private:
+    bool terminal_ = ::isatty(STDERR_FILENO) == 1;
+};
+
+std::filesystem::path metadata_of(const ReplayArguments& arguments) {
+    if (arguments.metadata) return *arguments.metadata;
+    auto path = arguments.capture;
+    return path.replace_extension(".json");
+}
+
+/// Totals of the run, for people.
+class Summary {
+  public:
+    void add(const PipelineFrame& frame) {
+        ++frames_;
+        valid_poses_ += frame.odometry.valid ? 1 : 0;
+        for (std::size_t i = 0; i < kStepCount; ++i) {
+            wall_ms_[i] += static_cast<double>(frame.times.wall_ms[i]);
+            cpu_ms_[i] += static_cast<double>(frame.times.cpu_ms[i]);
+        }
+    }
+    void print(const Pipeline& pipeline, const driver::PacketSource& source, double seconds) const {
+        std::printf("%llu frames, %llu valid poses, %.2f s, %.1f frames/s\n", static_cast<unsigned long long>(frames_),
+                    static_cast<unsigned long long>(valid_poses_), seconds, static_cast<double>(frames_) / seconds);
+        if (frames_ > 0) print_steps();
+        std::printf("packets:");
+        const driver::CounterVisitor print_counter = [](std::string_view name, std::uint64_t value) {
+            if (value != 0) std::printf(" %.*s %llu", static_cast<int>(name.size()), name.data(), static_cast<unsigned long long>(value));
+        };
+        source.visit_counters(print_counter);
+        pipeline.ingest().visit_counters(print_counter);
+        std::printf("\n");
+    }
+
+  private:
+    void print_steps() const {
+        std::printf("%-14s %9s %9s\n", "step", "wall ms", "CPU ms");
+        double total = 0.0;
+        for (std::size_t i = 0; i < kStepCount; ++i) {
+            const double n = static_cast<double>(frames_);
+            std::printf("%-14s %9.3f %9.3f\n", kStepNames[i], wall_ms_[i] / n, cpu_ms_[i] / n);
+            total += cpu_ms_[i] / n;
+        }
+        std::printf("%-14s %9s %9.3f\n", "total", "", total);
+    }
+
+    std::uint64_t frames_ = 0;
+    std::uint64_t valid_poses_ = 0;
+    std::array<double, kStepCount> wall_ms_{};
+    std::array<double, kStepCount> cpu_ms_{};
+};
+
+}  // namespace
+
+ExitCode replay(const ReplayArguments& arguments) {
+    const auto sensor = driver::load_metadata(metadata_of(arguments));
+    const Config config = load_config(arguments.config, &sensor);
+    spdlog::set_level(static_cast<spdlog::level::level_enum>(config.log.level));
+    for (const auto& warning : sensor.warnings) spdlog::warn("{}", warning);
+
+    driver::PcapSource source(arguments.capture);
+    std::unique_ptr<ResultWriter> writer;
+    if (!config.output.folder.empty()) {
+        writer = std::make_unique<ResultWriter>(config.output.folder, static_cast<TimingClock>(config.output.timing));
+    }
+
+    Summary summary;
+    FrameSinks sinks;
+    if (writer) sinks.write = [&](PipelineFrame& frame) { writer->write(frame); };
+    sinks.finished = [&](const PipelineFrame& frame) { summary.add(frame); };
+    SignalWaiter signals;
+    const auto start = Clock::now();
+    const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
+    Pipeline pipeline(sensor, config.method, config.frames, source, std::move(sinks),
+                      {.threads = config.pipeline.threads, .paced = arguments.rate > 0.0});
+    pipeline.start();
+
+    ProgressBar progress;
+    bool interrupted = false;
+    while (!pipeline.done()) {
+        const auto event = signals.wait(pipeline.done_descriptor(), std::chrono::milliseconds(200));
+        progress.show(source.progress(), pipeline.finished_frames(), elapsed());
+        if (event == SignalWaiter::Event::kStop) {
+            interrupted = true;
+            pipeline.stop();
+        }
+    }
+    progress.finish();
+    pipeline.rethrow_failure();
+    if (writer) {
+        pipeline.map().finish();
+        writer->finish(pipeline.map().points());
+    }
+    summary.print(pipeline, source, elapsed());
+    return interrupted ? ExitCode::kInterrupted : ExitCode::kSuccess;
+}
+
+}  // namespace dlod::daemon

@@ -1,0 +1,106 @@
+// Command line of dlod.
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+#include <exception>
+
+#include "daemon/commands/commands.hpp"
+#include "daemon/config/option.hpp"
+#include "daemon/output/output_file.hpp"
+#include "driver/metadata.hpp"
+#include "driver/packet_source.hpp"
+
+namespace {
+
+using dlod::daemon::ExitCode;
+
+constexpr const char* kExitCodes =
+    "Exit codes: 0 success (replay: the capture's end was reached), 1 failure, 2 command line, 3 configuration or "
+    "metadata, 4 capture or socket, 5 output, 6 LCM.";
+
+/// Options that stand for one setting each, in the order given.
+void add_setting(CLI::App& command, const std::string& flag, const std::string& key, std::vector<std::string>& settings,
+                 const std::string& help) {
+    command.add_option_function<std::string>(
+        flag, [key, &settings](const std::string& value) { settings.push_back(key + "=" + value); }, help);
+}
+
+void add_config_options(CLI::App& command, dlod::daemon::ConfigSources& config) {
+    command.add_option("-c,--config", config.file, "configuration file (YAML); keys that it does not name keep their defaults");
+    command.add_option_function<std::vector<std::string>>(
+               "--set",
+               [&config](const std::vector<std::string>& values) {
+                   config.settings.insert(config.settings.end(), values.begin(), values.end());
+               },
+               "a single setting, key=value; may be repeated")
+        ->allow_extra_args(false);
+}
+
+int fail(ExitCode code, const std::exception& error) {
+    std::fprintf(stderr, "dlod: %s\n", error.what());
+    return static_cast<int>(code);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    using namespace dlod::daemon;
+    CLI::App app("Dynamic LiDAR odometry: pose, moving points and tracks from an Ouster lidar, over LCM.", "dlod");
+    app.set_version_flag("--version", "dlod " DLOD_VERSION);
+    app.require_subcommand(1);
+    app.footer(kExitCodes);
+
+    ReplayArguments replay_arguments;
+    auto* replay_command = app.add_subcommand("replay", "process a capture (pcap, pcapng)");
+    replay_command->add_option("PCAP", replay_arguments.capture, "capture file")->required();
+    replay_command->add_option("--metadata", replay_arguments.metadata, "sensor metadata (JSON); default: PCAP's name with .json");
+    add_config_options(*replay_command, replay_arguments.config);
+    add_setting(*replay_command, "--threads", "pipeline.threads", replay_arguments.config.settings, "threads that run the stages");
+    add_setting(*replay_command, "--out", "output.folder", replay_arguments.config.settings, "folder for result files");
+    add_setting(*replay_command, "--lcm", "lcm.url", replay_arguments.config.settings, "LCM provider; default: none");
+    replay_command->add_option("--rate", replay_arguments.rate, "0: as fast as possible (default), 1: true rate, 2: twice as fast, ...")
+        ->check(CLI::Range(0.0, 1000.0));
+
+    std::filesystem::path info_file;
+    std::optional<std::filesystem::path> info_metadata;
+    auto* info_command = app.add_subcommand("info", "describe a capture or a metadata file");
+    info_command->add_option("FILE", info_file, "capture, or sensor metadata ending in .json")->required();
+    info_command->add_option("--metadata", info_metadata, "metadata of the capture; default: its name with .json");
+
+    ConfigSources checked;
+    std::optional<std::filesystem::path> checked_metadata;
+    auto* check_command = app.add_subcommand("check-config", "check a configuration file");
+    check_command->add_option("FILE", checked.file, "configuration file")->required();
+    check_command->add_option("--metadata", checked_metadata, "check it on top of this sensor's preset");
+
+    ConfigSources printed;
+    std::optional<std::filesystem::path> printed_metadata;
+    auto* print_command = app.add_subcommand("print-config", "print every key with its meaning and its value in effect");
+    add_config_options(*print_command, printed);
+    print_command->add_option("--metadata", printed_metadata, "with this sensor's preset");
+
+    for (auto* command : app.get_subcommands({})) command->footer(kExitCodes);
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        return app.exit(error) == 0 ? 0 : static_cast<int>(ExitCode::kUsage);
+    }
+    try {
+        ExitCode code = ExitCode::kSuccess;
+        if (*replay_command) code = replay(replay_arguments);
+        if (*info_command) code = info(info_file, info_metadata);
+        if (*check_command) code = check_config(checked, checked_metadata);
+        if (*print_command) code = print_config(printed, printed_metadata);
+        return static_cast<int>(code);
+    } catch (const ConfigError& error) {
+        return fail(ExitCode::kConfiguration, error);
+    } catch (const dlod::driver::MetadataError& error) {
+        return fail(ExitCode::kConfiguration, error);
+    } catch (const dlod::driver::SourceError& error) {
+        return fail(ExitCode::kInput, error);
+    } catch (const OutputError& error) {
+        return fail(ExitCode::kOutput, error);
+    } catch (const std::exception& error) {
+        return fail(ExitCode::kFailure, error);
+    }
+}

@@ -1,0 +1,138 @@
+#include "daemon/pipeline/pipeline.hpp"
+
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+namespace dlod::daemon {
+namespace {
+
+/// Two under construction, one at work and one waiting at each of the heavier stages, two at the lighter ones.
+constexpr std::size_t kFramesInFlight = 9;
+/// Between stages: what is further ahead is only older when its turn comes.
+constexpr std::size_t kQueueLength = 1;
+
+int make_event_descriptor() {
+    const int descriptor = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    if (descriptor < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
+    return descriptor;
+}
+
+}  // namespace
+
+Pipeline::Pipeline(const driver::SensorInfo& sensor, const MethodConfig& method, const driver::FrameBuilderConfig& frames,
+                   driver::PacketSource& source, FrameSinks sinks, PipelineOptions options)
+    : geometry_(sensor.model),
+      method_(sensor.model, method),
+      source_(source),
+      sinks_(std::move(sinks)),
+      options_(std::move(options)),
+      done_descriptor_(make_event_descriptor()),
+      pool_(sensor.model, kFramesInFlight + (options_.live ? static_cast<std::size_t>(options_.waiting_frames) : 0)),
+      to_prepare_(pool_.size()),
+      to_odometry_(kQueueLength),
+      to_detection_(kQueueLength),
+      to_publish_(kQueueLength),
+      to_map_(kQueueLength),
+      to_write_(kQueueLength),
+      prepare_(to_prepare_, to_odometry_, pool_.dropped(), options_.live ? static_cast<std::size_t>(options_.waiting_frames) : 0,
+               [this](PipelineFrame& frame) { prepare(frame); }),
+      odometry_(to_odometry_, to_detection_, [this](PipelineFrame& frame) { estimate_pose(frame); },
+                [this] { return detection_.completed() + kFeedbackDelay > odometry_.completed(); }),
+      detection_(to_detection_, to_publish_, [this](PipelineFrame& frame) { detect_and_track(frame); }),
+      publish_(to_publish_, to_map_, [this](PipelineFrame& frame) { publish(frame); }),
+      map_(to_map_, to_write_, [this](PipelineFrame& frame) { update_map(frame); }),
+      write_(to_write_, pool_.finished(), [this](PipelineFrame& frame) { write(frame); }),
+      ingest_(source, sensor, frames, pool_, to_prepare_, prepare_, events_,
+              {.live = options_.live, .paced = options_.live || options_.paced}) {}
+
+Pipeline::~Pipeline() {
+    source_.stop();
+    workers_.reset();
+    ingest_.abandon();
+    if (receiver_.joinable()) receiver_.join();
+    ::close(done_descriptor_);
+}
+
+void Pipeline::start() {
+    // The most advanced frame first: it is the oldest, and its data are still in the cache.
+    std::vector<Actor*> actors = {&write_, &map_, &publish_, &detection_, &odometry_, &prepare_};
+    const bool own_thread = options_.live || options_.paced;
+    if (!own_thread) actors.push_back(&ingest_);
+    workers_ = std::make_unique<WorkerPool>(std::move(actors), options_.threads, events_, options_.on_thread_start,
+                                            [this] { signal_if_done(); });
+    if (own_thread) {
+        receiver_ = std::thread([this] {
+            if (options_.on_thread_start) options_.on_thread_start(options_.threads);
+            ingest_.run_until_end();
+            signal_if_done();
+        });
+    }
+}
+
+bool Pipeline::done() const {
+    return (workers_ && workers_->failed()) ||
+           (ingest_.ended() && write_.completed() + prepare_.dropped_frames() == ingest_.emitted_frames());
+}
+
+void Pipeline::rethrow_failure() const {
+    if (workers_ && workers_->failed()) std::rethrow_exception(workers_->failure());
+}
+
+void Pipeline::signal_if_done() {
+    if (!done()) return;
+    const std::uint64_t one = 1;
+    [[maybe_unused]] const auto written = ::write(done_descriptor_, &one, sizeof(one));
+}
+
+void Pipeline::prepare(PipelineFrame& frame) {
+    const auto timed = [&](Step step, auto&& work) {
+        const StepTimer timer(frame.times, step);
+        work();
+    };
+    timed(Step::kGeometry, [&] { geometry_.process(frame); });
+    timed(Step::kSubsampling, [&] { method_.subsample(frame); });
+    timed(Step::kGround, [&] { method_.remove_ground(frame); });
+    timed(Step::kSegmentation, [&] { method_.segment(frame); });
+}
+
+void Pipeline::estimate_pose(PipelineFrame& frame) {
+    const StepTimer timer(frame.times, Step::kOdometry);
+    const std::uint64_t n = odometry_.completed();
+    method_.estimate_pose(frame, n >= kFeedbackDelay ? &feedback_[n % kFeedbackDelay] : nullptr);
+}
+
+void Pipeline::detect_and_track(PipelineFrame& frame) {
+    const auto timed = [&](Step step, auto&& work) {
+        const StepTimer timer(frame.times, step);
+        work();
+    };
+    timed(Step::kDetection, [&] { method_.detect(frame); });
+    timed(Step::kTracking, [&] { method_.track(frame); });
+    timed(Step::kRemoval, [&] { method_.remove_dynamic_points(frame, feedback_[detection_.completed() % kFeedbackDelay]); });
+}
+
+void Pipeline::publish(PipelineFrame& frame) {
+    {
+        const StepTimer timer(frame.times, Step::kPublish);
+        if (sinks_.publish) sinks_.publish(frame);
+    }
+    const std::int64_t latency_ns = options_.live ? StepTimer::now_ns(CLOCK_REALTIME) - frame.header.receive_ns
+                                                  : StepTimer::now_ns(CLOCK_MONOTONIC) - frame.emitted_ns;
+    frame.latency_ms = static_cast<float>(1e-6 * static_cast<double>(latency_ns));
+}
+
+void Pipeline::update_map(PipelineFrame& frame) {
+    const StepTimer timer(frame.times, Step::kMap);
+    method_.update_map(frame);
+}
+
+void Pipeline::write(PipelineFrame& frame) {
+    if (sinks_.write) sinks_.write(frame);
+    if (sinks_.finished) sinks_.finished(frame);
+}
+
+}  // namespace dlod::daemon

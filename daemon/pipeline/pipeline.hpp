@@ -1,0 +1,101 @@
+// From packets to published, mapped and written results: the stages on a pool of threads.
+//
+//   ingest -> prepare -> odometry -> detect and track -> publish -> map -> write
+//
+// Each stage works on one frame at a time and sees the frames in order; different stages work on different frames side
+// by side. The feedback of the n-th frame reaches the odometry of frame n + kFeedbackDelay: the odometry waits for it,
+// and never takes an older or a newer one. So the results depend on nothing but the frames.
+#pragma once
+
+#include "core/dynamic_lidar_odometry.hpp"
+#include "daemon/pipeline/frame_pool.hpp"
+#include "daemon/pipeline/ingest.hpp"
+#include "daemon/pipeline/stage.hpp"
+#include "driver/geometry.hpp"
+
+#include <array>
+#include <functional>
+#include <memory>
+#include <thread>
+#include <vector>
+
+namespace dlod::daemon {
+
+/// What becomes of a frame's results. Each is called on some worker, for one frame at a time, in order; what it throws
+/// ends the pipeline (Pipeline::rethrow_failure). An empty one is skipped.
+struct FrameSinks {
+    std::function<void(PipelineFrame&)> publish;
+    std::function<void(PipelineFrame&)> write;
+    std::function<void(const PipelineFrame&)> finished;  ///< after all others, with all times known
+};
+
+struct PipelineOptions {
+    int threads = 2;
+    int waiting_frames = 2;   ///< live: more than these are dropped, oldest first
+    bool live = false;        ///< receive on a thread of its own, never wait for the stages
+    bool paced = false;       ///< replay in time: the source waits for packets, on a thread of its own
+    std::function<void(int)> on_thread_start = {};  ///< on each thread, with its number; the last one receives
+};
+
+class Pipeline {
+  public:
+    /// Allocates everything; start() sets it going.
+    Pipeline(const driver::SensorInfo& sensor, const MethodConfig& method, const driver::FrameBuilderConfig& frames,
+             driver::PacketSource& source, FrameSinks sinks, PipelineOptions options);
+    /// Ends at once, whatever is on its way.
+    ~Pipeline();
+
+    void start();
+    /// Ends the source; what has been received is processed to the end.
+    void stop() { source_.stop(); }
+    /// Becomes readable once the pipeline is done or has failed.
+    int done_descriptor() const { return done_descriptor_; }
+    bool done() const;
+    /// Throws what a sink has thrown, if so.
+    void rethrow_failure() const;
+
+    /// After done().
+    GlobalMap& map() { return method_.map(); }
+
+    const Ingest& ingest() const { return ingest_; }
+    std::uint64_t finished_frames() const { return write_.completed(); }
+    std::uint64_t dropped_frames() const { return prepare_.dropped_frames(); }
+
+  private:
+    void prepare(PipelineFrame& frame);
+    void estimate_pose(PipelineFrame& frame);
+    void detect_and_track(PipelineFrame& frame);
+    void publish(PipelineFrame& frame);
+    void update_map(PipelineFrame& frame);
+    void write(PipelineFrame& frame);
+    void signal_if_done();
+
+    driver::Geometry geometry_;
+    DynamicLidarOdometry method_;
+    driver::PacketSource& source_;
+    FrameSinks sinks_;
+    PipelineOptions options_;
+    int done_descriptor_;
+    EventCount events_;
+    std::array<OdometryFeedback, kFeedbackDelay> feedback_;  ///< of frame n at n % kFeedbackDelay
+
+    FramePool pool_;
+    FrameQueue to_prepare_;
+    FrameQueue to_odometry_;
+    FrameQueue to_detection_;
+    FrameQueue to_publish_;
+    FrameQueue to_map_;
+    FrameQueue to_write_;
+    IntakeStage prepare_;
+    Stage odometry_;
+    Stage detection_;
+    Stage publish_;
+    Stage map_;
+    Stage write_;
+    Ingest ingest_;
+
+    std::unique_ptr<WorkerPool> workers_;
+    std::thread receiver_;
+};
+
+}  // namespace dlod::daemon

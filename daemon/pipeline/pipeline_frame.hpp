@@ -1,0 +1,19 @@
+#pragma once
+
+#include "core/types/frame.hpp"
+#include "daemon/pipeline/stage_times.hpp"
+
+#include <cstdint>
+
+namespace dlod::daemon {
+
+/// A pooled frame with what only the daemon wants to know of it.
+struct PipelineFrame : Frame {
+    using Frame::Frame;
+
+    StageTimes times;
+    std::int64_t emitted_ns = 0;  ///< CLOCK_MONOTONIC when the frame builder gave it out
+    float latency_ms = 0.0F;      ///< from its last packet's receipt to the end of publishing
+};
+
+}  // namespace dlod::daemon
