@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "driver/imu.hpp"
@@ -19,11 +20,6 @@ constexpr int kRivalPacketsToBelieve = 64;
 constexpr int kRetiredPackets = 64;
 /// Beyond this a jump of frame ids says nothing about the number of frames lost.
 constexpr std::int32_t kMaximumLostFrames = 1000;
-/// Times from here on (year 2116) are no times, and would overflow signed arithmetic.
-constexpr std::uint64_t kMaximumTime_ns = std::uint64_t{1} << 62U;
-/// A column's time that is further from where both neighbours agree, in turns: isolated damage; motors are far
-/// steadier.
-constexpr double kIsolatedTime_turns = 0.002;
 /// Frames whose start is further from the sensor's rate, in turns, show a jump of its clock.
 constexpr double kClockJump_turns = 0.5;
 
@@ -36,17 +32,13 @@ FrameBuilder::FrameBuilder(const SensorInfo& info, const FrameBuilderConfig& con
       emit_(std::move(emit)),
       layout_(info.layout()),
       decoder_(layout_, info.model),
-      width_(info.model.width),
-      window_columns_(0),
-      column_period_ns_(info.model.frame_period_s * 1e9 / info.model.width) {
+      clock_(info.model.width, info.model.frame_period_s * 1e9, config.time_tolerance_turns),
+      width_(info.model.width) {
     for (int m = 0; m < width_; ++m) window_columns_ += in_window(m) ? 1 : 0;
-    const auto columns = static_cast<std::size_t>(width_);
-    for (Slot& slot : slots_) slot.columns.assign(columns, kMissing);
-    closed_columns_.assign(columns, kMissing);
-    time_error_ns_.assign(columns, 0.0);
-    timed_columns_.reserve(columns);
+    for (Slot& slot : slots_) slot.columns.assign(static_cast<std::size_t>(width_), kMissing);
+    closed_columns_.assign(static_cast<std::size_t>(width_), kMissing);
     headers_.resize(static_cast<std::size_t>(layout_.columns()));
-    suspect_.bytes.resize(layout_.packet_bytes());
+    suspect_bytes_.resize(layout_.packet_bytes());
 }
 
 bool FrameBuilder::in_window(int measurement) const {
@@ -81,141 +73,138 @@ void FrameBuilder::push_imu(const Packet& packet) {
         return;
     }
     ++counters_.imu_packets;
-    counters_.imu_rejected_samples += static_cast<std::uint64_t>(imu_.push(*sample));
+    counters_.imu_rejected_samples.add(imu_.push(*sample));
 }
 
 void FrameBuilder::push_lidar(const Packet& packet) {
-    const PacketHeader header = layout_.read_packet_header(packet.data);
-    if (header.type != kLidarPacketType) {
+    LidarPacket lidar{packet.data, packet.receive_ns, layout_.read_packet_header(packet.data)};
+    if (lidar.header.type != kLidarPacketType) {
         ++counters_.wrong_type_packets;
         return;
     }
-    if (is_foreign(packet, header)) {
+    if (is_foreign(packet, lidar.header)) {
         ++counters_.foreign_packets;
+        foreign_serial_.set(lidar.header.serial_number);
         return;
     }
-    if (read_columns(packet.data, header) < 0) {
+    if (!read_columns(lidar)) {
         ++counters_.damaged_packets;
         return;
     }
     sender_known_ = true;
     sender_ = packet.sender_address;
-    if (!route(packet.data, header, packet.receive_ns)) suspect(packet.data, header, packet.receive_ns);
+    if (!route(lidar)) suspect(lidar);
 }
 
 bool FrameBuilder::is_foreign(const Packet& packet, const PacketHeader& header) {
     const bool has_serial = info_.format->serial_number.present();
-    const std::uint64_t expected = has_serial ? info_.serial() : 0;
-    if (expected != 0) {
-        if (header.serial_number == expected) return false;
-        foreign_serial_ = header.serial_number;
-        return true;
-    }
+    if (has_serial && info_.serial() != 0) return header.serial_number != info_.serial();
     Origin origin;
     if (has_serial) {
         origin.serial = header.serial_number;
     } else {
         origin.sender = packet.sender_address;
     }
-    if (!origin_known_) {
-        origin_known_ = true;
-        origin_ = origin;
-    }
+    if (!origin_known_) origin_ = origin;
+    origin_known_ = true;
     if (origin == origin_) {
         rival_packets_ = 0;
         return false;
     }
     rival_packets_ = origin == rival_ ? rival_packets_ + 1 : 1;
     rival_ = origin;
-    if (rival_packets_ < kRivalPacketsToBelieve) {
-        foreign_serial_ = header.serial_number;
-        return true;
-    }
+    if (rival_packets_ < kRivalPacketsToBelieve) return true;
     origin_ = origin;
     rival_packets_ = 0;
     return false;
 }
 
-int FrameBuilder::read_columns(std::span<const std::byte> data, const PacketHeader& header) {
-    // Columns of a packet are consecutive: the first one's measurement follows from each, and the majority is right.
-    int first = -1;
+/// Fills headers_ and packet.first_measurement; false when most of the packet's columns contradict each other.
+bool FrameBuilder::read_columns(LidarPacket& packet) {
+    // Columns of a packet are consecutive, so each one tells the first one's measurement: the majority is right.
     int votes = 0;
     for (int i = 0; i < layout_.columns(); ++i) {
-        headers_[static_cast<std::size_t>(i)] = layout_.read_column_header(data, i);
-        const int candidate = headers_[static_cast<std::size_t>(i)].measurement_id - i;
-        if (votes == 0) first = candidate;
-        votes += candidate == first ? 1 : -1;
+        ColumnHeader& column = headers_[static_cast<std::size_t>(i)];
+        column = layout_.read_column_header(packet.data, i);
+        const int first = column.measurement_id - i;
+        if (votes == 0) packet.first_measurement = first;
+        votes += first == packet.first_measurement ? 1 : -1;
     }
     int trusted = 0;
-    for (int i = 0; i < layout_.columns(); ++i) trusted += is_trusted(i, first, header) ? 1 : 0;
-    const bool damaged = first < 0 || 2 * trusted < layout_.columns();
-    return damaged ? -1 : first;
+    for (int i = 0; i < layout_.columns(); ++i) trusted += is_trusted(packet, i) ? 1 : 0;
+    return packet.first_measurement >= 0 && 2 * trusted >= layout_.columns();
 }
 
-bool FrameBuilder::is_trusted(int column, int first_measurement, const PacketHeader& header) const {
-    const ColumnHeader& h = headers_[static_cast<std::size_t>(column)];
-    if (h.measurement_id != first_measurement + column || h.measurement_id >= width_) return false;
-    return !info_.format->column_frame_id.present() || h.frame_id == header.frame_id;
+bool FrameBuilder::is_trusted(const LidarPacket& packet, int column) const {
+    const ColumnHeader& header = headers_[static_cast<std::size_t>(column)];
+    if (header.measurement_id != packet.first_measurement + column || header.measurement_id >= width_) return false;
+    return !info_.format->column_frame_id.present() || header.frame_id == packet.header.frame_id;
 }
 
-bool FrameBuilder::route(std::span<const std::byte> data, const PacketHeader& header, std::int64_t receive_ns) {
+FrameBuilder::ColumnState FrameBuilder::state_of(int column) const {
+    return layout_.is_valid(headers_[static_cast<std::size_t>(column)]) ? kDecoded : kInvalid;
+}
+
+/// True when the packet's fate is settled, false when its frame or init id follows from nothing known.
+bool FrameBuilder::route(const LidarPacket& packet) {
     if (!started_) return false;
-    if (header.init_id != init_id_) {
-        if (retired_packets_left_ == 0 || header.init_id != retired_init_id_) return false;
+    if (packet.header.init_id != init_id_) {
+        if (retired_packets_left_ == 0 || packet.header.init_id != retired_init_id_) return false;
         --retired_packets_left_;
         ++counters_.late_packets;
         return true;
     }
-    const std::int32_t distance = info_.format->frame_distance(frame_id_, header.frame_id);
+    const std::int32_t distance = info_.format->frame_distance(frame_id_, packet.header.frame_id);
     if (distance < 0 && distance >= -kLateFrames && stragglers_ < kStragglersToBelieve) {
         ++stragglers_;
-        count_straggler(data, header, distance);
+        count_straggler(packet, distance);
         return true;
     }
     if (distance != 0 && distance != 1) return false;
     stragglers_ = 0;
     retired_packets_left_ = std::max(0, retired_packets_left_ - 1);
-    if (suspect_.present) {
+    if (suspect_present_) {
         ++counters_.implausible_packets;
-        suspect_.present = false;
+        suspect_present_ = false;
     }
-    add(data, header, slots_[static_cast<std::size_t>(distance)], receive_ns);
+    add(packet, slots_[static_cast<std::size_t>(distance)]);
     while (complete(slots_[0]) || complete(slots_[1]) || slots_[1].packets >= kPacketsToClose) advance();
     return true;
 }
 
-void FrameBuilder::count_straggler(std::span<const std::byte> data, const PacketHeader& header, std::int32_t distance) {
-    const int first = read_columns(data, header);
+void FrameBuilder::count_straggler(const LidarPacket& packet, std::int32_t distance) {
     bool known = distance == -1;
     for (int i = 0; i < layout_.columns() && known; ++i) {
-        known = !is_trusted(i, first, header) || closed_columns_[static_cast<std::size_t>(first + i)] != kMissing;
+        known = !is_trusted(packet, i) ||
+                closed_columns_[static_cast<std::size_t>(packet.first_measurement + i)] != kMissing;
     }
     ++(known ? counters_.duplicate_packets : counters_.late_packets);
 }
 
-void FrameBuilder::suspect(std::span<const std::byte> data, const PacketHeader& header, std::int64_t receive_ns) {
-    const int first = read_columns(data, header);
-    const std::int32_t distance = info_.format->frame_distance(suspect_.header.frame_id, header.frame_id);
-    const bool confirmed = suspect_.present && suspect_.header.init_id == header.init_id &&
-                           (std::abs(distance) == 1 || (distance == 0 && first != suspect_.first_measurement));
-    if (confirmed) {
-        suspect_.present = false;
-        start_at(distance >= 0 ? suspect_.header.frame_id : header.frame_id, header.init_id);
-        route(suspect_.bytes, suspect_.header, suspect_.receive_ns);
-        route(data, header, receive_ns);
+void FrameBuilder::suspect(const LidarPacket& packet) {
+    const std::int32_t distance = info_.format->frame_distance(suspect_.header.frame_id, packet.header.frame_id);
+    const bool other_packet = distance != 0 || packet.first_measurement != suspect_.first_measurement;
+    if (suspect_present_ && suspect_.header.init_id == packet.header.init_id && std::abs(distance) <= 1 &&
+        other_packet) {
+        suspect_present_ = false;
+        start_at(distance >= 0 ? suspect_.header.frame_id : packet.header.frame_id, packet.header.init_id);
+        read_columns(suspect_);
+        route(suspect_);
+        LidarPacket confirming = packet;
+        read_columns(confirming);
+        route(confirming);
         return;
     }
-    if (suspect_.present) ++counters_.implausible_packets;
-    suspect_.present = true;
-    suspect_.header = header;
-    suspect_.first_measurement = first;
-    suspect_.receive_ns = receive_ns;
-    std::copy(data.begin(), data.end(), suspect_.bytes.begin());
+    if (suspect_present_) ++counters_.implausible_packets;
+    suspect_present_ = true;
+    suspect_ = packet;
+    std::copy(packet.data.begin(), packet.data.end(), suspect_bytes_.begin());
+    suspect_.data = suspect_bytes_;
 }
 
 void FrameBuilder::start_at(std::uint32_t frame_id, std::uint32_t init_id) {
+    const bool restarted = init_id != init_id_;
     if (started_) {
-        const bool restarted = init_id != init_id_;
         ++(restarted ? counters_.restarts : counters_.frame_id_jumps);
         std::int32_t lost = restarted ? 0 : info_.format->frame_distance(frame_id_, frame_id);
         for (Slot& slot : slots_) {
@@ -223,7 +212,7 @@ void FrameBuilder::start_at(std::uint32_t frame_id, std::uint32_t init_id) {
             close(slot);
             --lost;
         }
-        if (lost > 0 && lost <= kMaximumLostFrames) counters_.lost_frames += static_cast<std::uint64_t>(lost);
+        if (lost > 0 && lost <= kMaximumLostFrames) counters_.lost_frames.add(static_cast<std::uint64_t>(lost));
         if (restarted) {
             retired_init_id_ = init_id_;
             retired_packets_left_ = kRetiredPackets;
@@ -231,7 +220,6 @@ void FrameBuilder::start_at(std::uint32_t frame_id, std::uint32_t init_id) {
             joined_in_turn_ = true;
         }
     }
-    for (Slot& slot : slots_) reset(slot);
     std::fill(closed_columns_.begin(), closed_columns_.end(), kMissing);
     previous_known_ = false;
     stragglers_ = 0;
@@ -240,16 +228,11 @@ void FrameBuilder::start_at(std::uint32_t frame_id, std::uint32_t init_id) {
     init_id_ = init_id;
 }
 
-void FrameBuilder::add(std::span<const std::byte> data, const PacketHeader& header, Slot& slot,
-                       std::int64_t receive_ns) {
-    const int first = read_columns(data, header);
+void FrameBuilder::add(const LidarPacket& packet, Slot& slot) {
     bool fresh = false;
     for (int i = 0; i < layout_.columns(); ++i) {
-        if (!is_trusted(i, first, header)) {
-            ++counters_.misnumbered_columns;
-            continue;
-        }
-        fresh = fresh || slot.columns[static_cast<std::size_t>(first + i)] < arrived_state(i);
+        fresh = fresh || (is_trusted(packet, i) &&
+                          slot.columns[static_cast<std::size_t>(packet.first_measurement + i)] < state_of(i));
     }
     if (!fresh) {
         ++counters_.duplicate_packets;
@@ -257,59 +240,56 @@ void FrameBuilder::add(std::span<const std::byte> data, const PacketHeader& head
     }
     if (slot.packets == 0) {
         slot.frame = acquire_();
-        if (slot.frame == nullptr) {
-            slot.dropped = true;
-        } else {
-            prepare(*slot.frame);
+        slot.dropped = slot.frame == nullptr;
+        if (slot.frame != nullptr) {
+            Columns& columns = slot.frame->columns;
+            std::fill(columns.time_ns.begin(), columns.time_ns.end(), 0);
+            std::fill(columns.status.begin(), columns.status.end(), 0U);
+            std::fill(columns.valid.begin(), columns.valid.end(), std::uint8_t{0});
         }
     }
     ++slot.packets;
-    slot.receive_ns = receive_ns;
-    if (first < slot.last_measurement || (&slot == slots_.data() && slots_[1].packets > 0))
-        ++counters_.reordered_packets;
-    slot.last_measurement = std::max(slot.last_measurement, first);
+    slot.receive_ns = packet.receive_ns;
+    const bool next_has_begun = &slot == slots_.data() && slots_[1].packets > 0;
+    if (packet.first_measurement < slot.last_measurement || next_has_begun) ++counters_.reordered_packets;
+    slot.last_measurement = std::max(slot.last_measurement, packet.first_measurement);
     ++(slot.dropped ? counters_.dropped_packets : counters_.lidar_packets);
-    add_columns(data, header, first, slot);
+    add_columns(packet, slot);
 }
 
-void FrameBuilder::add_columns(std::span<const std::byte> data, const PacketHeader& header, int first, Slot& slot) {
+void FrameBuilder::add_columns(const LidarPacket& packet, Slot& slot) {
     int run = 0;  // columns before i that are to be decoded together
     for (int i = 0; i <= layout_.columns(); ++i) {
-        bool decoded = false;
-        if (i < layout_.columns() && is_trusted(i, first, header)) {
-            const auto m = static_cast<std::size_t>(first + i);
-            const ColumnHeader& column = headers_[static_cast<std::size_t>(i)];
-            const ColumnState arrived = arrived_state(i);
-            if (slot.columns[m] == kMissing && in_window(first + i)) ++slot.columns_in_window;
-            if (slot.columns[m] < arrived) {
-                slot.columns[m] = arrived;
-                decoded = arrived == kDecoded && slot.frame != nullptr;
-                if (arrived == kInvalid && in_window(first + i)) ++counters_.invalid_columns;
-                if (slot.frame != nullptr) {
-                    const bool possible = column.time_ns < kMaximumTime_ns;
-                    slot.frame->columns.time_ns[m] = possible ? static_cast<std::int64_t>(column.time_ns) : -1;
-                    slot.frame->columns.status[m] = column.status;
-                    slot.frame->columns.valid[m] = arrived == kDecoded ? 1 : 0;
-                }
-            }
-        }
-        if (decoded) {
+        if (i < layout_.columns() && add_column(packet, i, slot)) {
             ++run;
         } else if (run > 0) {
-            decoder_.decode(data, i - run, run, first + i - run, slot.frame->raw);
+            decoder_.decode(packet.data, i - run, run, packet.first_measurement + i - run, slot.frame->raw);
             run = 0;
         }
     }
 }
 
-FrameBuilder::ColumnState FrameBuilder::arrived_state(int column) const {
-    return layout_.is_valid(headers_[static_cast<std::size_t>(column)]) ? kDecoded : kInvalid;
-}
-
-void FrameBuilder::prepare(Frame& frame) const {
-    std::fill(frame.columns.time_ns.begin(), frame.columns.time_ns.end(), 0);
-    std::fill(frame.columns.status.begin(), frame.columns.status.end(), 0U);
-    std::fill(frame.columns.valid.begin(), frame.columns.valid.end(), std::uint8_t{0});
+/// Enters the column's header; true when its pixels are to be decoded.
+bool FrameBuilder::add_column(const LidarPacket& packet, int column, Slot& slot) {
+    if (!is_trusted(packet, column)) {
+        ++counters_.misnumbered_columns;
+        return false;
+    }
+    const int measurement = packet.first_measurement + column;
+    const auto m = static_cast<std::size_t>(measurement);
+    const ColumnState state = state_of(column);
+    if (slot.columns[m] >= state) return false;
+    if (in_window(measurement)) {
+        if (slot.columns[m] == kMissing) ++slot.columns_in_window;
+        if (state == kInvalid) ++counters_.invalid_columns;
+    }
+    slot.columns[m] = state;
+    if (slot.frame == nullptr) return false;
+    const ColumnHeader& header = headers_[static_cast<std::size_t>(column)];
+    slot.frame->columns.time_ns[m] = ColumnClock::to_time(header.time_ns);
+    slot.frame->columns.status[m] = header.status;
+    slot.frame->columns.valid[m] = state == kDecoded ? 1 : 0;
+    return state == kDecoded;
 }
 
 void FrameBuilder::advance() {
@@ -319,146 +299,70 @@ void FrameBuilder::advance() {
         ++counters_.lost_frames;
         std::fill(closed_columns_.begin(), closed_columns_.end(), kMissing);
     }
-    reset(slots_[0]);
     std::swap(slots_[0], slots_[1]);
     ++frame_id_;
 }
 
-void FrameBuilder::reset(Slot& slot) {
+/// Emits the slot's frame, if it has one, and makes the slot free.
+void FrameBuilder::close(Slot& slot) {
+    count_lost_packets(slot);
+    joined_in_turn_ = false;
+    if (slot.dropped) {
+        ++counters_.dropped_frames;
+    } else {
+        finish(*slot.frame, slot, &slot == slots_.data() ? frame_id_ : frame_id_ + 1);
+        emit_(slot.frame);
+    }
+    closed_columns_.swap(slot.columns);
+    std::fill(slot.columns.begin(), slot.columns.end(), kMissing);
     slot.frame = nullptr;
     slot.dropped = false;
     slot.packets = 0;
     slot.columns_in_window = 0;
     slot.last_measurement = -1;
-    slot.receive_ns = 0;
-    std::fill(slot.columns.begin(), slot.columns.end(), kMissing);
 }
 
-void FrameBuilder::close(Slot& slot) {
-    const std::uint32_t id = &slot == slots_.data() ? frame_id_ : frame_id_ + 1;
-    count_lost_packets(slot);
-    joined_in_turn_ = false;
-    std::copy(slot.columns.begin(), slot.columns.end(), closed_columns_.begin());
-    if (slot.dropped) {
-        ++counters_.dropped_frames;
-        return;
-    }
-    Frame& frame = *slot.frame;
-    reject_mistimed(frame.columns, id);
+void FrameBuilder::finish(Frame& frame, const Slot& slot, std::uint32_t frame_id) {
+    counters_.mistimed_columns.add(static_cast<std::uint64_t>(clock_.reject(frame.columns)));
     clear_gaps(frame);
 
     FrameHeader& header = frame.header;
     header = FrameHeader{};
     header.sequence = sequence_++;
-    header.frame_id = id & static_cast<std::uint32_t>((std::uint64_t{1} << info_.format->frame_id_bits()) - 1);
+    header.frame_id = info_.format->frame_id_bits() == 16 ? frame_id & 0xFFFFU : frame_id;
     header.receive_ns = slot.receive_ns;
-    for (int m = 0; m < width_; ++m) {
-        const auto i = static_cast<std::size_t>(m);
-        if (frame.columns.valid[i] == 0) continue;
-        if (header.valid_columns++ == 0) header.first_stamp_ns = frame.columns.time_ns[i];
-        header.stamp_ns = frame.columns.time_ns[i];
+    for (std::size_t m = 0; m < frame.columns.valid.size(); ++m) {
+        if (frame.columns.valid[m] == 0) continue;
+        if (header.valid_columns == 0) header.first_stamp_ns = frame.columns.time_ns[m];
+        header.stamp_ns = frame.columns.time_ns[m];
+        ++header.valid_columns;
     }
     header.usable = header.valid_columns > 0 && header.valid_columns >= config_.minimum_valid_share * window_columns_;
     frame.imu.clear();
     if (header.valid_columns > 0) {
-        counters_.imu_rejected_samples += static_cast<std::uint64_t>(imu_.take(header.stamp_ns, frame.imu));
+        check_clock(frame_id);
+        counters_.imu_rejected_samples.add(imu_.take(header.stamp_ns, frame.imu));
     }
     ++counters_.frames;
     if (header.valid_columns < window_columns_) ++counters_.incomplete_frames;
     if (!header.usable) ++counters_.unusable_frames;
-    emit_(std::exchange(slot.frame, nullptr));
 }
 
-void FrameBuilder::reject_mistimed(Columns& columns, std::uint32_t frame_id) {
-    const double turn_ns = column_period_ns_ * width_;
-    const double tolerance_ns = config_.time_tolerance_turns * turn_ns;
-    int count = 0;
-    int first = -1;
-    int last = -1;
-    for (int m = 0; m < width_; ++m) {
-        if (columns.valid[static_cast<std::size_t>(m)] == 0) continue;
-        if (first < 0) first = m;
-        last = m;
-        ++count;
-    }
-    if (count == 0) return;
-    const auto time_at = [&](int m) { return static_cast<double>(columns.time_ns[static_cast<std::size_t>(m)]); };
-    // The turn's start that most columns agree on (majority vote with a tolerance), and how many agree.
-    const auto agree = [&](double period_ns) {
-        double start = 0.0;
-        int votes = 0;
-        int support = 0;
-        for (int m = 0; m < width_; ++m) {
-            if (columns.valid[static_cast<std::size_t>(m)] == 0) continue;
-            const double candidate = time_at(m) - m * period_ns;
-            if (votes == 0) start = candidate;
-            votes += std::abs(candidate - start) <= tolerance_ns ? 1 : -1;
-        }
-        for (int m = 0; m < width_; ++m) {
-            if (columns.valid[static_cast<std::size_t>(m)] == 0) continue;
-            support += std::abs(time_at(m) - m * period_ns - start) <= tolerance_ns ? 1 : 0;
-        }
-        return std::pair{start, support};
-    };
-    double period_ns = column_period_ns_;
-    auto [start, support] = agree(period_ns);
-    if (2 * support < count && last > first) {
-        // The sensor may turn at another rate than its metadata says.
-        const double measured_ns = (time_at(last) - time_at(first)) / (last - first);
-        const auto [measured_start, measured_support] = agree(measured_ns);
-        if (measured_ns > 0.0 && measured_support > support) {
-            period_ns = measured_ns;
-            start = measured_start;
-        }
-    }
-    const auto reject = [&](int m) {
-        const auto i = static_cast<std::size_t>(m);
-        counters_.mistimed_columns += columns.valid[i];
-        columns.valid[i] = 0;
-        columns.time_ns[i] = 0;
-    };
-    timed_columns_.clear();
-    for (int m = 0; m < width_; ++m) {
-        const auto i = static_cast<std::size_t>(m);
-        time_error_ns_[i] = time_at(m) - m * period_ns - start;
-        if (columns.time_ns[i] == 0) continue;
-        if (std::abs(time_error_ns_[i]) > tolerance_ns || columns.time_ns[i] < 0) {
-            reject(m);
-        } else if (columns.valid[i] != 0) {
-            timed_columns_.push_back(m);
-        }
-    }
-    reject_isolated(columns, kIsolatedTime_turns * turn_ns);
-
-    const auto turns = static_cast<double>(info_.format->frame_distance(previous_frame_id_, frame_id));
-    if (previous_known_ && std::abs(start - previous_start_ns_ - turns * turn_ns) > kClockJump_turns * turn_ns) {
+void FrameBuilder::check_clock(std::uint32_t frame_id) {
+    const double turn_ns = info_.model.frame_period_s * 1e9;
+    const double expected_ns =
+        previous_start_ns_ + turn_ns * info_.format->frame_distance(previous_frame_id_, frame_id);
+    if (previous_known_ && std::abs(clock_.start_ns() - expected_ns) > kClockJump_turns * turn_ns) {
         ++counters_.clock_jumps;
     }
     previous_known_ = true;
-    previous_start_ns_ = start;
+    previous_start_ns_ = clock_.start_ns();
     previous_frame_id_ = frame_id;
 }
 
-void FrameBuilder::reject_isolated(Columns& columns, double tolerance_ns) {
-    // A median of three: where a column's two nearest agree with each other but not with it, it is wrong.
-    const std::size_t count = timed_columns_.size();
-    for (std::size_t k = 0; count >= 3 && k < count; ++k) {
-        const std::size_t centre = std::clamp<std::size_t>(k, 1, count - 2);
-        const auto error = [&](std::size_t at) { return time_error_ns_[static_cast<std::size_t>(timed_columns_[at])]; };
-        const double own = error(k);
-        const double one = error(k == centre - 1 ? centre : centre - 1);
-        const double other = error(k == centre + 1 ? centre : centre + 1);
-        if (std::abs(one - other) > tolerance_ns) continue;
-        if (std::abs(own - one) <= tolerance_ns || std::abs(own - other) <= tolerance_ns) continue;
-        const auto m = static_cast<std::size_t>(timed_columns_[k]);
-        ++counters_.mistimed_columns;
-        columns.valid[m] = 0;
-        columns.time_ns[m] = 0;
-    }
-}
-
+/// Columns that were not written, or are not trusted, still hold the pixels of whichever frame was here before.
 void FrameBuilder::clear_gaps(Frame& frame) const {
-    int gap = 0;  // columns before m that hold an earlier frame's pixels
+    int gap = 0;
     for (int m = 0; m <= width_; ++m) {
         if (m < width_ && frame.columns.valid[static_cast<std::size_t>(m)] == 0) {
             ++gap;
@@ -471,7 +375,7 @@ void FrameBuilder::clear_gaps(Frame& frame) const {
 
 void FrameBuilder::count_lost_packets(const Slot& slot) {
     const int columns = layout_.columns();
-    std::uint64_t pending = 0;  // missing since the last packet that arrived
+    std::uint64_t missing = 0;  // since the last packet that arrived
     bool any_arrived = false;
     for (int first = 0; first < width_; first += columns) {
         bool expected = false;
@@ -481,24 +385,28 @@ void FrameBuilder::count_lost_packets(const Slot& slot) {
             arrived = arrived || slot.columns[static_cast<std::size_t>(m)] != kMissing;
         }
         if (arrived) {
-            if (any_arrived || !joined_in_turn_) counters_.lost_packets += pending;
+            if (any_arrived || !joined_in_turn_) counters_.lost_packets.add(missing);
             any_arrived = true;
-            pending = 0;
+            missing = 0;
         } else if (expected) {
-            ++pending;
+            ++missing;
         }
     }
-    if (!ending_) counters_.lost_packets += pending;
+    if (!ending_) counters_.lost_packets.add(missing);
 }
 
 void FrameBuilder::flush() {
-    if (suspect_.present && !started_) {
-        start_at(suspect_.header.frame_id, suspect_.header.init_id);
-        suspect_.present = false;
-        route(suspect_.bytes, suspect_.header, suspect_.receive_ns);
+    if (suspect_present_) {
+        suspect_present_ = false;
+        if (started_) {
+            ++counters_.implausible_packets;
+        } else {
+            // A capture of a single packet: nothing speaks against it.
+            start_at(suspect_.header.frame_id, suspect_.header.init_id);
+            read_columns(suspect_);
+            route(suspect_);
+        }
     }
-    if (suspect_.present) ++counters_.implausible_packets;
-    suspect_.present = false;
     while (slots_[0].packets > 0 || slots_[1].packets > 0) {
         ending_ = slots_[1].packets == 0;
         advance();

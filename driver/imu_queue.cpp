@@ -4,8 +4,8 @@
 
 namespace dlod::driver {
 
-int ImuQueue::push(const ImuSample& sample) {
-    int rejected = 0;
+std::uint64_t ImuQueue::push(const ImuSample& sample) {
+    std::uint64_t rejected = 0;
     const auto earlier = [](const ImuSample& a, const ImuSample& b) { return a.stamp_ns < b.stamp_ns; };
     auto position = std::upper_bound(samples_.begin(), samples_.end(), sample, earlier);
     if (position != samples_.begin() && std::prev(position)->stamp_ns == sample.stamp_ns) return 1;
@@ -19,7 +19,7 @@ int ImuQueue::push(const ImuSample& sample) {
     return rejected;
 }
 
-int ImuQueue::take(std::int64_t stamp_ns, std::vector<ImuSample>& out) {
+std::uint64_t ImuQueue::take(std::int64_t stamp_ns, std::vector<ImuSample>& out) {
     out.clear();
     const auto at_or_before = [](std::int64_t t) { return [t](const ImuSample& s) { return s.stamp_ns <= t; }; };
     const auto due = std::partition_point(samples_.begin(), samples_.end(), at_or_before(stamp_ns));
@@ -29,7 +29,7 @@ int ImuQueue::take(std::int64_t stamp_ns, std::vector<ImuSample>& out) {
     out.assign(recent, due);
     samples_.erase(absurd, samples_.end());
     samples_.erase(samples_.begin(), due);
-    return static_cast<int>(rejected);
+    return static_cast<std::uint64_t>(rejected);
 }
 
 }  // namespace dlod::driver

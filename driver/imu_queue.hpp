@@ -16,11 +16,11 @@ class ImuQueue {
     ImuQueue() { samples_.reserve(kCapacity); }
 
     /// Returns the number of samples that were thrown away: this one when its time is already there, or the oldest.
-    int push(const ImuSample& sample);
+    std::uint64_t push(const ImuSample& sample);
 
     /// Moves the samples up to `stamp_ns` to `out`, which is cleared first. Throws away and counts those that no clock
     /// explains: over a second beyond the stamp, or over kHistory before it.
-    int take(std::int64_t stamp_ns, std::vector<ImuSample>& out);
+    std::uint64_t take(std::int64_t stamp_ns, std::vector<ImuSample>& out);
 
     void clear() { samples_.clear(); }
 

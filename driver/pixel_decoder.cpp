@@ -11,29 +11,55 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "packets are little-endian and read in place");
 
-/// Pixels of one row in consecutive columns: where the first one is and how far apart they are.
-struct PixelRun {
-    const std::byte* first;
-    std::size_t stride;
-    std::size_t count;
+constexpr int kBlock = 16;  // columns of most packets
+
+/// One block of pixels of a row: columns side by side in the images, `column_stride` bytes apart in the packet.
+struct Block {
+    const std::byte* pixels;
+    std::size_t column_stride;
+    FieldCut range, reflectivity, signal, near_ir;
+    std::uint32_t* range_out;
+    std::uint8_t* reflectivity_out;
+    std::uint16_t* signal_out;
+    std::uint16_t* near_ir_out;
 };
 
-template <class T>
-inline void extract(const PixelRun& run, const FieldExtraction& field, T* __restrict out) {
-    const std::byte* source = run.first + field.byte_offset;
-    for (std::size_t i = 0; i < run.count; ++i, source += run.stride) {
-        std::uint32_t word;
-        std::memcpy(&word, source, sizeof(word));
-        out[i] = static_cast<T>(((word >> field.right) & field.mask) << field.left);
-    }
+/// Words of a pixel that hold the fields are gathered once; the cutting then works on whole vectors.
+inline __attribute__((always_inline)) void decode_block(const Block& block, const int count) {
+    std::uint32_t words[kBlock];
+    int gathered = -1;
+    const auto cut = [&](const FieldCut& field, auto* __restrict out) {
+        if (field.mask == 0) return;
+        if (field.word != gathered) {
+            const std::byte* source = block.pixels + 4 * field.word;
+            for (int i = 0; i < count; ++i, source += block.column_stride) std::memcpy(&words[i], source, 4);
+            gathered = field.word;
+        }
+        const FieldCut f = field;
+        for (int i = 0; i < count; ++i) {
+            out[i] = static_cast<std::remove_reference_t<decltype(*out)>>(((words[i] >> f.right) & f.mask) << f.left);
+        }
+    };
+    cut(block.range, block.range_out);
+    cut(block.reflectivity, block.reflectivity_out);
+    cut(block.signal, block.signal_out);
+    cut(block.near_ir, block.near_ir_out);
 }
 
-FieldExtraction extraction(const BitField& field, int pixel_bytes) {
+DLOD_MULTIVERSION
+void decode_full_block(const Block& block) {
+    decode_block(block, kBlock);
+}
+
+DLOD_MULTIVERSION
+void decode_part_of_block(const Block& block, int count) {
+    decode_block(block, count);
+}
+
+FieldCut cut_of(const BitField& field) {
     if (!field.present()) return {};
-    // The 32 bits must not reach beyond the pixel: the last one of a packet may be the last thing in memory.
-    const int byte = std::min(field.bit_offset / 8, pixel_bytes - 4);
-    return {.byte_offset = static_cast<std::uint32_t>(byte),
-            .right = static_cast<std::uint32_t>(field.bit_offset - 8 * byte),
+    return {.word = field.bit_offset / 32,
+            .right = static_cast<std::uint32_t>(field.bit_offset % 32),
             .mask = (std::uint32_t{1} << field.bits) - 1,
             .left = field.shift};
 }
@@ -44,29 +70,43 @@ PixelDecoder::PixelDecoder(const PacketLayout& layout, const SensorModel& sensor
     : layout_(layout), width_(sensor.width) {
     for (const int shift : sensor.pixel_shift) shift_.push_back(((shift % width_) + width_) % width_);
     const PacketFormat& format = layout.format();
-    range_ = extraction(format.field(PixelField::kRange), format.pixel_bytes);
-    reflectivity_ = extraction(format.field(PixelField::kReflectivity), format.pixel_bytes);
-    signal_ = extraction(format.field(PixelField::kSignal), format.pixel_bytes);
-    near_ir_ = extraction(format.field(PixelField::kNearIr), format.pixel_bytes);
+    range_ = cut_of(format.field(PixelField::kRange));
+    reflectivity_ = cut_of(format.field(PixelField::kReflectivity));
+    signal_ = cut_of(format.field(PixelField::kSignal));
+    near_ir_ = cut_of(format.field(PixelField::kNearIr));
 }
 
 void PixelDecoder::decode(std::span<const std::byte> packet, int first_column, int count, int first_measurement,
                           RawImages& images) const {
-    const auto decode_run = [&](int row, int column, int destination, int pixels) {
-        const PixelRun run{packet.data() + layout_.pixel_offset(column, row), layout_.column_bytes(),
-                           static_cast<std::size_t>(pixels)};
-        extract(run, range_, images.range_mm.row(row) + destination);
-        extract(run, reflectivity_, images.reflectivity.row(row) + destination);
-        if (signal_.mask != 0) extract(run, signal_, images.signal.row(row) + destination);
-        extract(run, near_ir_, images.near_ir.row(row) + destination);
-    };
+    Block block{.pixels = nullptr,
+                .column_stride = layout_.column_bytes(),
+                .range = range_,
+                .reflectivity = reflectivity_,
+                .signal = signal_,
+                .near_ir = near_ir_,
+                .range_out = nullptr,
+                .reflectivity_out = nullptr,
+                .signal_out = nullptr,
+                .near_ir_out = nullptr};
     // Rows outside, columns inside: each row's pixels of a packet lie side by side in the destaggered image.
     for (int row = 0; row < layout_.rows(); ++row) {
         int destination = first_measurement + shift_[static_cast<std::size_t>(row)];
         if (destination >= width_) destination -= width_;
-        const int before_edge = std::min(count, width_ - destination);
-        decode_run(row, first_column, destination, before_edge);
-        if (before_edge < count) decode_run(row, first_column + before_edge, 0, count - before_edge);
+        for (int done = 0; done < count;) {
+            const int pixels = std::min({count - done, kBlock, width_ - destination});
+            block.pixels = packet.data() + layout_.pixel_offset(first_column + done, row);
+            block.range_out = images.range_mm.row(row) + destination;
+            block.reflectivity_out = images.reflectivity.row(row) + destination;
+            block.signal_out = images.signal.row(row) + destination;
+            block.near_ir_out = images.near_ir.row(row) + destination;
+            if (pixels == kBlock) {
+                decode_full_block(block);
+            } else {
+                decode_part_of_block(block, pixels);
+            }
+            done += pixels;
+            destination = destination + pixels == width_ ? 0 : destination + pixels;
+        }
     }
 }
 

@@ -11,9 +11,9 @@
 
 namespace dlod::driver {
 
-/// How to cut a field out of the 32 bits at a byte offset: ((bits >> right) & mask) << left.
-struct FieldExtraction {
-    std::uint32_t byte_offset = 0;
+/// How to cut a field out of a pixel's 32-bit word `word`: ((word >> right) & mask) << left.
+struct FieldCut {
+    int word = 0;
     std::uint32_t right = 0;
     std::uint32_t mask = 0;  ///< 0: the format lacks the field
     std::uint32_t left = 0;
@@ -35,7 +35,7 @@ class PixelDecoder {
     PacketLayout layout_;
     int width_;
     std::vector<int> shift_;  ///< [rows] in 0 .. width - 1
-    FieldExtraction range_, reflectivity_, signal_, near_ir_;
+    FieldCut range_, reflectivity_, signal_, near_ir_;
 };
 
 }  // namespace dlod::driver
