@@ -1,13 +1,147 @@
 #include "core/map/global_map.hpp"
 
+#include <algorithm>
+#include <cstdint>
+
 namespace dlod {
 
-struct GlobalMap::State {};
+namespace {
 
-GlobalMap::GlobalMap(const SensorModel&, const GlobalMapConfig&) : state_(std::make_unique<State>()) {}
+constexpr std::size_t kPrefetch = 12;  // points: about the latency of main memory
+constexpr std::size_t kClearedCellsAFrame = 4000;
+constexpr double kForgottenShare = 0.1;  // of a full map, at a time
+
+/// Near pixels lie many to a cell: of each four that are looked at, so many are skipped.
+constexpr float kNear_m = 8.0F, kMiddle_m = 16.0F;
+
+/// What one frame adds and clears, kept until it is its turn.
+struct Postponed {
+    std::vector<MapPoint> points;
+    std::vector<OrientedBox> cleared;
+};
+
+}  // namespace
+
+struct GlobalMap::State {
+    State(const SensorModel& model, const GlobalMapConfig& map)
+        : sensor(model), config(map), cells(map.cell_m), waiting(static_cast<std::size_t>(map.delay_frames) + 1) {
+        for (Postponed& p : waiting) p.points.reserve(sensor.pixels() / 4 + static_cast<std::size_t>(sensor.height));
+    }
+
+    void postpone(const Frame& frame, Postponed& out);
+    void enter(Postponed& postponed);
+    void clear_some(std::size_t budget);
+    void forget_farthest();
+
+    SensorModel sensor;
+    GlobalMapConfig config;
+    CellTable cells;
+    std::vector<Postponed> waiting;  ///< ring over the frames
+    std::uint64_t frames = 0;
+    std::vector<OrientedBox> to_clear;
+    Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
+};
+
+GlobalMap::GlobalMap(const SensorModel& sensor, const GlobalMapConfig& config)
+    : state_(std::make_unique<State>(sensor, config)) {}
 GlobalMap::~GlobalMap() = default;
-void GlobalMap::update(const Frame&) {}
-void GlobalMap::finish() {}
-std::vector<MapPoint> GlobalMap::points() const { return {}; }
+
+void GlobalMap::update(const Frame& frame) {
+    State& s = *state_;
+    Postponed& slot = s.waiting[s.frames++ % s.waiting.size()];
+    s.enter(slot);  // what came delay_frames + 1 frames ago
+    s.postpone(frame, slot);
+    s.clear_some(kClearedCellsAFrame);
+    if (s.cells.size() > static_cast<std::size_t>(s.config.max_points)) s.forget_farthest();
+}
+
+void GlobalMap::finish() {
+    State& s = *state_;
+    for (std::size_t i = 0; i < s.waiting.size(); ++i) s.enter(s.waiting[(s.frames + i) % s.waiting.size()]);
+    while (!s.to_clear.empty()) s.clear_some(kClearedCellsAFrame);
+    if (s.cells.size() > static_cast<std::size_t>(s.config.max_points)) s.forget_farthest();
+}
+
+std::vector<MapPoint> GlobalMap::points() const {
+    return state_->cells.sorted();
+}
+
+// Every fourth pixel of each row, shifted from row to row and from frame to frame, so that four frames see all.
+void GlobalMap::State::postpone(const Frame& frame, Postponed& out) {
+    out.points.clear();
+    out.cleared.clear();
+    if (!frame.odometry.valid) return;
+    position_m = frame.odometry.T_world_sensor.translation();
+    out.cleared.assign(frame.detection.cleared.begin(), frame.detection.cleared.end());
+    const Eigen::Isometry3f T = frame.odometry.T_world_sensor.cast<float>();
+    const auto min_range = static_cast<float>(config.min_range_m);
+    const auto max_range = static_cast<float>(config.max_range_m);
+    const auto width = static_cast<std::size_t>(sensor.width);
+    for (std::size_t r = 0; r < static_cast<std::size_t>(sensor.height); ++r) {
+        const std::uint8_t* label = frame.detection.label.row(static_cast<int>(r));
+        const float* range = frame.cloud.range_m.row(static_cast<int>(r));
+        for (std::size_t c = (frames + 2 * r) % 4; c < width; c += 4) {
+            const bool enters = label[c] == static_cast<std::uint8_t>(PixelLabel::kStatic) ||
+                                label[c] == static_cast<std::uint8_t>(PixelLabel::kGround);
+            if (!enters || range[c] < min_range || range[c] > max_range) continue;
+            const unsigned skipped = range[c] < kNear_m ? 3U : range[c] < kMiddle_m ? 1U : 0U;
+            if (((c / 4 + frames / 4 + r / 2) & skipped) != 0) continue;
+            const std::size_t i = r * width + c;
+            const Eigen::Vector3f p =
+                T * Eigen::Vector3f(frame.odometry.x[i], frame.odometry.y[i], frame.odometry.z[i]);
+            out.points.push_back({p.x(), p.y(), p.z()});
+        }
+    }
+}
+
+void GlobalMap::State::enter(Postponed& postponed) {
+    const auto& points = postponed.points;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        if (i + kPrefetch < points.size()) cells.prefetch(points[i + kPrefetch]);
+        cells.insert(points[i]);
+    }
+    // Everything that was seen before the object turned dynamic has entered by now.
+    to_clear.insert(to_clear.end(), postponed.cleared.begin(), postponed.cleared.end());
+    postponed.points.clear();
+    postponed.cleared.clear();
+}
+
+void GlobalMap::State::clear_some(std::size_t budget) {
+    std::size_t done = 0;
+    std::size_t visited = 0;
+    for (; done < to_clear.size() && visited < budget; ++done) {
+        const OrientedBox& box = to_clear[done];
+        const double c = std::abs(std::cos(box.yaw_rad)), s = std::abs(std::sin(box.yaw_rad));
+        const Eigen::Vector3d reach = 0.5 * Eigen::Vector3d(c * box.size_m.x() + s * box.size_m.y(),
+                                                            s * box.size_m.x() + c * box.size_m.y(), box.size_m.z());
+        const Eigen::Vector3d low = box.center_m - reach, high = box.center_m + reach;
+        const CellTable::Index first = cells.index_of(low.x(), low.y(), low.z());
+        const CellTable::Index last = cells.index_of(high.x(), high.y(), high.z());
+        for (std::int32_t x = first.x; x <= last.x; ++x) {
+            for (std::int32_t y = first.y; y <= last.y; ++y) {
+                for (std::int32_t z = first.z; z <= last.z; ++z, ++visited) {
+                    const MapPoint* p = cells.find({x, y, z});
+                    if (p != nullptr && box.contains(Eigen::Vector3d(p->x, p->y, p->z))) cells.erase({x, y, z});
+                }
+            }
+        }
+    }
+    to_clear.erase(to_clear.begin(), to_clear.begin() + static_cast<std::ptrdiff_t>(done));
+}
+
+void GlobalMap::State::forget_farthest() {
+    const auto distance2 = [&](const MapPoint& p) {
+        return (Eigen::Vector3d(p.x, p.y, p.z) - position_m).squaredNorm();
+    };
+    std::vector<double> distances;
+    distances.reserve(cells.size());
+    for (std::size_t slot = 0; slot < cells.slots(); ++slot) {
+        if (const MapPoint* p = cells.at(slot)) distances.push_back(distance2(*p));
+    }
+    const auto keep = static_cast<std::ptrdiff_t>((1.0 - kForgottenShare) * config.max_points);
+    std::nth_element(distances.begin(), distances.begin() + keep, distances.end());
+    const double bound = distances[static_cast<std::size_t>(keep)];
+    cells.retain([&](const MapPoint& p) { return distance2(p) < bound; });
+}
 
 }  // namespace dlod

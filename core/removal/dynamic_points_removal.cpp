@@ -1,19 +1,100 @@
 #include "core/removal/dynamic_points_removal.hpp"
 
+#include "core/types/multiversion.hpp"
+
 namespace dlod {
 
-void DynamicPointsRemoval::process(Frame& frame, OdometryFeedback& feedback) {
-    auto& detection = frame.detection;
-    detection.instance.fill(0);
-    detection.dynamic_points = 0;
-    for (std::size_t i = 0; i < detection.label.size(); ++i) {
-        detection.label[i] = static_cast<std::uint8_t>(frame.raw.range_mm[i] != 0 ? PixelLabel::kStatic : PixelLabel::kNoReturn);
+namespace {
+
+constexpr auto kNoReturn = static_cast<std::uint8_t>(PixelLabel::kNoReturn);
+constexpr auto kStatic = static_cast<std::uint8_t>(PixelLabel::kStatic);
+constexpr auto kDynamic = static_cast<std::uint8_t>(PixelLabel::kDynamic);
+constexpr auto kUndecided = static_cast<std::uint8_t>(PixelLabel::kUndecided);
+constexpr auto kGround = static_cast<std::uint8_t>(PixelLabel::kGround);
+
+/// Labels before any object: nothing, ground or static.
+DLOD_MULTIVERSION void label_background(const std::uint32_t* __restrict range, const std::uint8_t* __restrict ground,
+                                        std::size_t size, std::uint8_t* __restrict label) {
+    for (std::size_t i = 0; i < size; ++i) {
+        const std::uint8_t surface = ground[i] != 0 ? kGround : kStatic;
+        label[i] = range[i] != 0 ? surface : kNoReturn;
     }
+}
+
+DLOD_MULTIVERSION void label_background_without_ground(const std::uint32_t* __restrict range, std::size_t size,
+                                                       std::uint8_t* __restrict label) {
+    for (std::size_t i = 0; i < size; ++i) label[i] = range[i] != 0 ? kStatic : kNoReturn;
+}
+
+}  // namespace
+
+void DynamicPointsRemoval::process(Frame& frame, OdometryFeedback& feedback) {
+    label_pixels(frame);
     feedback.sequence = frame.header.sequence;
     feedback.stamp_ns = frame.header.stamp_ns;
     feedback.moving.clear();
     feedback.has_keyframe = false;
     feedback.cleared.clear();
+    if (!frame.odometry.valid) return;
+
+    for (OrientedBox& box : frame.detection.cleared) box.size_m.array() += 2.0 * config_.margin_m;
+    feedback.cleared = frame.detection.cleared;
+    for (const Track& track : frame.detection.tracks) {
+        if (track.state == DynamicState::kDynamic) feedback.moving.push_back({track.box, track.velocity_mps});
+    }
+    if (frame.odometry.keyframe) fill_keyframe(frame, feedback);
+}
+
+void DynamicPointsRemoval::label_pixels(Frame& frame) const {
+    DetectionResult& result = frame.detection;
+    result.instance.fill(0);
+    result.dynamic_points = 0;
+    const bool valid = frame.odometry.valid;
+    if (valid) {
+        label_background(frame.raw.range_mm.data(), frame.prepared.ground.data(), result.label.size(),
+                         result.label.data());
+    } else {
+        label_background_without_ground(frame.raw.range_mm.data(), result.label.size(), result.label.data());
+    }
+    for (const Detection& detection : result.detections) {
+        const Track* track =
+            valid && detection.track >= 0 ? &result.tracks[static_cast<std::size_t>(detection.track)] : nullptr;
+        const DynamicState state = track != nullptr ? track->state : DynamicState::kUndefined;
+        const std::uint8_t label = state == DynamicState::kDynamic  ? kDynamic
+                                   : state == DynamicState::kStatic ? kStatic
+                                                                    : kUndecided;
+        const std::uint32_t instance = track != nullptr ? track->id : 0;
+        for (std::uint32_t i = detection.first; i < detection.first + detection.count; ++i) {
+            const PixelIndex pixel = result.pixels[i];
+            result.label[pixel] = label;
+            result.instance[pixel] = instance;
+        }
+        if (label == kDynamic) result.dynamic_points += static_cast<int>(detection.count);
+    }
+}
+
+void DynamicPointsRemoval::fill_keyframe(const Frame& frame, OdometryFeedback& feedback) const {
+    const PointSelection& points = frame.prepared.points;
+    const OdometryResult& odometry = frame.odometry;
+    KeyframeCloud& cloud = feedback.keyframe;
+    for (auto* v : {&cloud.x, &cloud.y, &cloud.z, &cloud.nx, &cloud.ny, &cloud.nz}) v->clear();
+    cloud.T_world_sensor = odometry.T_world_sensor;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const PixelIndex pixel = points.pixel[i];
+        const std::uint8_t label = frame.detection.label[pixel];
+        if (label == kDynamic || label == kUndecided) continue;
+        const int p = static_cast<int>(pixel);
+        const auto m = static_cast<std::size_t>(sensor_.measurement_of(p / sensor_.width, p % sensor_.width));
+        const auto& d = odometry.deskew;
+        const float nx = points.nx[i], ny = points.ny[i], nz = points.nz[i];
+        cloud.x.push_back(odometry.x[pixel]);
+        cloud.y.push_back(odometry.y[pixel]);
+        cloud.z.push_back(odometry.z[pixel]);
+        cloud.nx.push_back(d[0][m] * nx + d[1][m] * ny + d[2][m] * nz);
+        cloud.ny.push_back(d[4][m] * nx + d[5][m] * ny + d[6][m] * nz);
+        cloud.nz.push_back(d[8][m] * nx + d[9][m] * ny + d[10][m] * nz);
+    }
+    feedback.has_keyframe = true;
 }
 
 }  // namespace dlod

@@ -13,17 +13,24 @@ struct RemovalConfig {
 
     template <class V>
     void visit(V& v) {
-        v.parameter("margin_m", margin_m, Range{0.0, 1.0}, "m", "boxes are grown by this much on every side when their past is cleared");
+        v.parameter("margin_m", margin_m, Range{0.0, 1.0}, "m",
+                    "boxes are grown by this much on every side when their past is cleared");
     }
 };
 
-/// Fills frame.detection.label, .instance and .dynamic_points, and the feedback to the odometry.
+/// Fills frame.detection.label, .instance and .dynamic_points from this frame's detections alone (a track that is only
+/// predicted marks no pixel), and the feedback to the odometry: boxes of moving objects, boxes to clear, and the
+/// keyframe without the points of objects that are not static. Grows frame.detection.cleared by the margin. A frame
+/// whose odometry is not valid knows no ground and no moving object.
 class DynamicPointsRemoval {
   public:
     DynamicPointsRemoval(const SensorModel& sensor, const RemovalConfig& config) : sensor_(sensor), config_(config) {}
     void process(Frame& frame, OdometryFeedback& feedback);
 
   private:
+    void label_pixels(Frame& frame) const;
+    void fill_keyframe(const Frame& frame, OdometryFeedback& feedback) const;
+
     SensorModel sensor_;
     RemovalConfig config_;
 };

@@ -1,15 +1,221 @@
 #include "core/tracking/tracker.hpp"
 
+#include <algorithm>
+#include <numeric>
+
+#include "core/tracking/association.hpp"
+#include "core/tracking/box_iou.hpp"
+#include "core/tracking/detection_shapes.hpp"
+#include "core/tracking/merged_detections.hpp"
+#include "core/tracking/tracked_object.hpp"
+
 namespace dlod {
 
-struct Tracker::State {};
+namespace {
 
-Tracker::Tracker(const SensorModel&, const TrackingConfig&) : state_(std::make_unique<State>()) {}
+constexpr double kPartMargin_m = 0.15;  // a part's middle lies at most this far outside of the whole object's box
+constexpr double kSameFootprint = 0.4;  // parts above one another share that much of the smaller footprint
+constexpr double kMaxGap_m = 0.5;       // and are at most that far apart in height
+constexpr double kDuplicate = 0.6;      // an unseen track that shares that much with a seen one is the same object
+
+double shared_footprint(const OrientedBox& a, const OrientedBox& b) {
+    const double smaller = std::min(a.size_m.x() * a.size_m.y(), b.size_m.x() * b.size_m.y());
+    return smaller > 0.0 ? footprint_intersection_m2(a, b) / smaller : 0.0;
+}
+
+double height_gap_m(const OrientedBox& a, const OrientedBox& b) {
+    return std::abs(a.center_m.z() - b.center_m.z()) - 0.5 * (a.size_m.z() + b.size_m.z());
+}
+
+CandidateDetection candidate(const Detection& detection, const DetectionShape& shape) {
+    MotionCues cues;
+    cues.free_points = detection.free_points;
+    cues.occupied_points = detection.occupied_points;
+    const double share = free_share(cues);
+    CandidateDetection c;
+    c.visible = detection.box;
+    c.points = static_cast<int>(detection.count);
+    c.age_s = shape.age_s;
+    c.motion = share < 0.0 ? 0.0 : std::clamp(3.0 * share - 1.0, -1.0, 1.0);
+    return c;
+}
+
+}  // namespace
+
+struct Tracker::State {
+    State(const SensorModel& sensor, const TrackingConfig& tracking) : config(tracking), shapes(sensor) {
+        objects.reserve(static_cast<std::size_t>(tracking.max_tracks));
+    }
+
+    void predict(const Frame& frame);
+    void associate(Frame& frame);
+    void attach_parts(Frame& frame);
+    void see_and_miss(Frame& frame);
+    void give_birth(Frame& frame);
+    void publish(Frame& frame);
+    Sighting sighting_of(const Frame& frame, std::size_t owner);
+
+    TrackingConfig config;
+    std::vector<TrackedObject> objects;  ///< by ascending id
+    std::uint32_t next_id = 1;
+    std::int64_t stamp_ns = 0;
+    bool started = false;
+
+    DetectionShapes shapes;
+    MergedDetections merged;
+    Association association;
+    std::vector<ExpectedTrack> expected;
+    std::vector<CandidateDetection> candidates;
+    std::vector<int> owner;          ///< of each detection: index into objects, -1 none
+    std::vector<std::size_t> parts;  ///< detections of the object at hand
+};
+
+Tracker::Tracker(const SensorModel& sensor, const TrackingConfig& config)
+    : state_(std::make_unique<State>(sensor, config)) {}
 Tracker::~Tracker() = default;
 
 void Tracker::process(Frame& frame) {
     frame.detection.tracks.clear();
     frame.detection.cleared.clear();
+    state_->predict(frame);
+    if (frame.odometry.valid) {
+        state_->associate(frame);
+        state_->attach_parts(frame);
+        state_->see_and_miss(frame);
+        state_->give_birth(frame);
+    }
+    state_->publish(frame);
+}
+
+void Tracker::State::predict(const Frame& frame) {
+    const double dt_s = started ? 1e-9 * static_cast<double>(frame.header.stamp_ns - stamp_ns) : 0.0;
+    stamp_ns = frame.header.stamp_ns;
+    started = true;
+    for (TrackedObject& object : objects) object.predict(std::max(0.0, dt_s), config);
+    expected.clear();
+    for (const TrackedObject& object : objects) expected.push_back(object.expected());
+    owner.assign(frame.detection.detections.size(), -1);
+}
+
+void Tracker::State::associate(Frame& frame) {
+    auto& detections = frame.detection.detections;
+    shapes.compute(frame);
+    merged.divide(frame, shapes, expected);
+    candidates.clear();
+    for (std::size_t d = 0; d < detections.size(); ++d) candidates.push_back(candidate(detections[d], shapes[d]));
+    owner.assign(detections.size(), -1);
+    const std::vector<int>& detection_of = association.solve(expected, candidates, config.association);
+    for (std::size_t t = 0; t < detection_of.size(); ++t) {
+        if (detection_of[t] >= 0) owner[static_cast<std::size_t>(detection_of[t])] = static_cast<int>(t);
+    }
+}
+
+// What is left and lies inside of the box of an object that was found is a part of it, split off by an occluder.
+void Tracker::State::attach_parts(Frame& frame) {
+    const auto& detections = frame.detection.detections;
+    const std::vector<int> matched = owner;
+    for (std::size_t d = 0; d < detections.size(); ++d) {
+        if (matched[d] >= 0) continue;
+        double best = kPartMargin_m;
+        for (std::size_t other = 0; other < detections.size(); ++other) {
+            if (matched[other] < 0) continue;
+            const auto t = static_cast<std::size_t>(matched[other]);
+            if (!objects[t].steady() || candidates[d].motion * expected[t].motion < -0.2) continue;
+            const OrientedBox box = objects[t].box();
+            if (height_gap_m(box, detections[d].box) > kMaxGap_m) continue;
+            const double distance = footprint_distance_m(box, detections[d].centroid_m);
+            if (distance < best) {
+                best = distance;
+                owner[d] = matched[other];
+            }
+        }
+    }
+}
+
+Sighting Tracker::State::sighting_of(const Frame& frame, std::size_t t) {
+    const auto& detections = frame.detection.detections;
+    parts.clear();
+    for (std::size_t d = 0; d < detections.size(); ++d) {
+        if (owner[d] == static_cast<int>(t)) parts.push_back(d);
+    }
+    std::stable_sort(parts.begin(), parts.end(),
+                     [&](std::size_t a, std::size_t b) { return detections[a].count > detections[b].count; });
+    Sighting sighting;
+    sighting.detections = parts;
+    sighting.visibility.sensor_m = frame.odometry.T_world_sensor.translation();
+    for (std::size_t d : parts) {
+        sighting.visibility.occluded_left |= detections[d].occluded_left;
+        sighting.visibility.occluded_right |= detections[d].occluded_right;
+    }
+    return sighting;
+}
+
+void Tracker::State::see_and_miss(Frame& frame) {
+    for (std::size_t t = 0; t < objects.size(); ++t) {
+        const Sighting sighting = sighting_of(frame, t);
+        if (!sighting.detections.empty()) objects[t].see(frame, shapes, sighting, config, frame.detection.cleared);
+    }
+    for (std::size_t t = 0; t < objects.size(); ++t) {
+        if (objects[t].seen()) continue;
+        objects[t].miss(false);
+    }
+    // Two tracks on one object: the one that was not seen goes.
+    const auto duplicate = [&](const TrackedObject& object) {
+        if (object.seen()) return false;
+        return std::any_of(objects.begin(), objects.end(), [&](const TrackedObject& other) {
+            return other.seen() && shared_footprint(object.box(), other.box()) > kDuplicate;
+        });
+    };
+    std::vector<std::size_t>& gone = parts;
+    gone.clear();
+    for (std::size_t t = 0; t < objects.size(); ++t) {
+        if (objects[t].dead(config) || duplicate(objects[t])) gone.push_back(t);
+    }
+    if (gone.empty()) return;
+    for (int& t : owner) {
+        if (t >= 0)
+            t -= static_cast<int>(std::lower_bound(gone.begin(), gone.end(), static_cast<std::size_t>(t)) -
+                                  gone.begin());
+    }
+    for (auto t = gone.rbegin(); t != gone.rend(); ++t)
+        objects.erase(objects.begin() + static_cast<std::ptrdiff_t>(*t));
+}
+
+// The largest detections first; what stands above or below one of them is the same object.
+void Tracker::State::give_birth(Frame& frame) {
+    const auto& detections = frame.detection.detections;
+    std::vector<std::size_t> left;
+    for (std::size_t d = 0; d < detections.size(); ++d) {
+        if (owner[d] < 0) left.push_back(d);
+    }
+    std::stable_sort(left.begin(), left.end(),
+                     [&](std::size_t a, std::size_t b) { return detections[a].count > detections[b].count; });
+    for (std::size_t i = 0; i < left.size() && objects.size() < static_cast<std::size_t>(config.max_tracks); ++i) {
+        const std::size_t d = left[i];
+        if (owner[d] >= 0) continue;
+        const auto t = static_cast<int>(objects.size());
+        owner[d] = t;
+        for (std::size_t j = i + 1; j < left.size(); ++j) {
+            const OrientedBox& part = detections[left[j]].box;
+            if (owner[left[j]] < 0 && shared_footprint(detections[d].box, part) > kSameFootprint &&
+                height_gap_m(detections[d].box, part) < kMaxGap_m) {
+                owner[left[j]] = t;
+            }
+        }
+        objects.emplace_back(next_id++, frame, shapes, sighting_of(frame, static_cast<std::size_t>(t)), config);
+    }
+}
+
+void Tracker::State::publish(Frame& frame) {
+    std::vector<int> row(objects.size(), -1);
+    for (std::size_t t = 0; t < objects.size(); ++t) {
+        if (!objects[t].seen() && objects[t].state() != DynamicState::kDynamic) continue;
+        row[t] = static_cast<int>(frame.detection.tracks.size());
+        frame.detection.tracks.push_back(objects[t].published());
+    }
+    for (std::size_t d = 0; d < owner.size(); ++d) {
+        frame.detection.detections[d].track = owner[d] < 0 ? -1 : row[static_cast<std::size_t>(owner[d])];
+    }
 }
 
 }  // namespace dlod

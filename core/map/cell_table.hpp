@@ -1,0 +1,90 @@
+// A hash of cubic cells with one point each: the store of the global map.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace dlod {
+
+/// A point of a map, world frame, metres.
+struct MapPoint {
+    float x = 0.0F, y = 0.0F, z = 0.0F;
+};
+
+/// Open addressing with linear probing; erasing leaves no tombstones. Grows by doubling, never shrinks by itself.
+class CellTable {
+  public:
+    explicit CellTable(double cell_m);
+
+    std::size_t size() const { return size_; }
+    double cell_m() const { return cell_m_; }
+
+    /// Integer coordinates of a cell, about 200 km each way at 0.2 m.
+    struct Index {
+        std::int32_t x = 0, y = 0, z = 0;
+    };
+    Index index_of(double x, double y, double z) const {
+        return {static_cast<std::int32_t>(std::floor(x * inverse_cell_)),
+                static_cast<std::int32_t>(std::floor(y * inverse_cell_)),
+                static_cast<std::int32_t>(std::floor(z * inverse_cell_))};
+    }
+
+    /// Keeps the point unless its cell holds one already.
+    void insert(const MapPoint& point);
+    /// The point of a cell, or nullptr. Valid until the next change.
+    const MapPoint* find(const Index& index) const;
+    /// Forgets a cell; false where it was empty.
+    bool erase(const Index& index);
+    /// Loads the memory of a cell ahead of its use.
+    void prefetch(const MapPoint& point) const { __builtin_prefetch(&slots_[home(key_of(point))], 1); }
+
+    /// Number of slots, for walking over the table piece by piece.
+    std::size_t slots() const { return slots_.size(); }
+    /// The point in a slot, or nullptr.
+    const MapPoint* at(std::size_t slot) const { return slots_[slot].key != kEmpty ? &slots_[slot].point : nullptr; }
+
+    /// Forgets the cells for which `keep(point)` is false.
+    template <class Keep>
+    void retain(Keep keep) {
+        std::vector<Slot> old(slots_.size());
+        old.swap(slots_);
+        size_ = 0;
+        for (const Slot& slot : old) {
+            if (slot.key != kEmpty && keep(slot.point)) insert_new(slot);
+        }
+    }
+
+    /// All points by ascending cell: the order depends on the cells alone, not on when they came.
+    std::vector<MapPoint> sorted() const;
+
+  private:
+    struct Slot {
+        std::uint64_t key = kEmpty;
+        MapPoint point;
+    };
+    static constexpr std::uint64_t kEmpty = ~std::uint64_t{0};
+
+    static std::uint64_t key_of(const Index& i) {
+        constexpr std::uint64_t kMask = (std::uint64_t{1} << 21U) - 1;
+        constexpr std::int64_t kOffset = std::int64_t{1} << 20U;
+        const auto part = [](std::int32_t v) { return static_cast<std::uint64_t>(v + kOffset) & kMask; };
+        return part(i.x) << 42U | part(i.y) << 21U | part(i.z);
+    }
+    std::uint64_t key_of(const MapPoint& p) const { return key_of(index_of(p.x, p.y, p.z)); }
+    std::size_t home(std::uint64_t key) const {
+        return static_cast<std::size_t>((key * 0x9E3779B97F4A7C15ULL) >> shift_);
+    }
+    std::size_t slot_of(std::uint64_t key) const;
+    void insert_new(const Slot& slot);
+    void grow();
+
+    double cell_m_;
+    double inverse_cell_;
+    std::vector<Slot> slots_;
+    unsigned shift_;
+    std::size_t size_ = 0;
+};
+
+}  // namespace dlod

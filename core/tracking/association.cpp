@@ -1,0 +1,161 @@
+#include "core/tracking/association.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "core/tracking/box_iou.hpp"
+
+namespace dlod {
+
+namespace {
+
+/// Position of a track against a detection, in units of the gate: above 1 the pair is out of the question.
+double gated_distance(const ExpectedTrack& track, const CandidateDetection& detection,
+                      const AssociationConfig& config) {
+    const Eigen::Vector2d offset = (detection.visible.center_m - track.visible.center_m).head<2>();
+    // Visible boxes shift by a part of their size when limbs and sides come and go.
+    const double slack =
+        0.1 + 0.15 * std::min(track.visible.size_m.head<2>().norm(), detection.visible.size_m.head<2>().norm());
+    const double distance = offset.norm();
+    const double reach = config.max_speed_mps * track.dt_s + slack;
+    if (distance > reach) return 2.0;
+    if (track.young) return distance / reach;
+    const Eigen::Vector2d expected = track.filter->box().center_m.head<2>() + offset;
+    const double d2 =
+        track.filter->plane_distance2(expected, detection.age_s, slack * slack * Eigen::Matrix2d::Identity());
+    return std::sqrt(d2) / config.gate_sigma;
+}
+
+/// Cost of believing two contradicting things about motion.
+double contradiction(const ExpectedTrack& track, const CandidateDetection& detection, const AssociationConfig& config) {
+    return config.evidence_weight * std::max(0.0, -track.motion * detection.motion);
+}
+
+double relative_difference(double a, double b) {
+    return a == b ? 0.0 : 1.0 - std::min(a, b) / std::max(a, b);
+}
+
+int root_of(std::vector<int>& parent, int i) {
+    while (parent[static_cast<std::size_t>(i)] != i) {
+        auto& up = parent[static_cast<std::size_t>(i)];
+        up = parent[static_cast<std::size_t>(up)];
+        i = up;
+    }
+    return i;
+}
+
+}  // namespace
+
+double Association::cost(const OrientedBox& a, int points_a, const OrientedBox& b, int points_b,
+                         const AssociationConfig& config) {
+    return config.alpha * (1.0 - box_iou(a, b)) + config.beta * relative_difference(points_a, points_b);
+}
+
+const std::vector<int>& Association::solve(std::span<const ExpectedTrack> tracks,
+                                           std::span<const CandidateDetection> detections,
+                                           const AssociationConfig& config) {
+    detection_of_.assign(tracks.size(), -1);
+    track_of_.assign(detections.size(), -1);
+
+    pairs_.clear();
+    for (std::size_t t = 0; t < tracks.size(); ++t) {
+        for (std::size_t d = 0; d < detections.size(); ++d) {
+            const ExpectedTrack& track = tracks[t];
+            const CandidateDetection& detection = detections[d];
+            if (gated_distance(track, detection, config) > 1.0) continue;
+            const double c = cost(track.visible, track.points, detection.visible, detection.points, config) +
+                             contradiction(track, detection, config);
+            if (c < std::min(config.unmatched_cost, config.alpha))
+                pairs_.push_back({static_cast<int>(t), static_cast<int>(d), c});
+        }
+    }
+    assign(tracks.size(), detections.size(), config.unmatched_cost);
+    if (!config.second_pass) return detection_of_;
+
+    pairs_.clear();
+    for (std::size_t t = 0; t < tracks.size(); ++t) {
+        if (detection_of_[t] >= 0) continue;
+        for (std::size_t d = 0; d < detections.size(); ++d) {
+            if (track_of_[d] >= 0) continue;
+            const ExpectedTrack& track = tracks[t];
+            const CandidateDetection& detection = detections[d];
+            const double distance = gated_distance(track, detection, config);
+            if (distance > 1.0) continue;
+            const double c =
+                0.5 * distance + 0.3 * relative_difference(track.visible.size_m.z(), detection.visible.size_m.z()) +
+                0.2 * relative_difference(track.points, detection.points) + contradiction(track, detection, config);
+            if (c < config.unmatched_cost) pairs_.push_back({static_cast<int>(t), static_cast<int>(d), c});
+        }
+    }
+    assign(tracks.size(), detections.size(), config.unmatched_cost);
+    return detection_of_;
+}
+
+// Pairs that share neither a track nor a detection, directly or by others, do not compete: each group of competitors is
+// solved by itself, which keeps the cubic method to a handful of rows.
+void Association::assign(std::size_t tracks, std::size_t detections, double unmatched_cost) {
+    component_.resize(tracks + detections);
+    std::iota(component_.begin(), component_.end(), 0);
+    for (const Pair& pair : pairs_) {
+        const int a = root_of(component_, pair.track);
+        const int b = root_of(component_, static_cast<int>(tracks) + pair.detection);
+        component_[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
+    }
+    std::sort(pairs_.begin(), pairs_.end(), [&](const Pair& a, const Pair& b) {
+        const int ca = root_of(component_, a.track), cb = root_of(component_, b.track);
+        return ca != cb ? ca < cb : a.track != b.track ? a.track < b.track : a.detection < b.detection;
+    });
+    row_of_.assign(tracks, -1);
+    column_of_.assign(detections, -1);
+    for (std::size_t first = 0; first < pairs_.size();) {
+        std::size_t last = first;
+        const int component = root_of(component_, pairs_[first].track);
+        while (last < pairs_.size() && root_of(component_, pairs_[last].track) == component) ++last;
+        assign_component(first, last, unmatched_cost);
+        first = last;
+    }
+}
+
+void Association::assign_component(std::size_t first, std::size_t last, double unmatched_cost) {
+    const auto match = [&](int track, int detection) {
+        detection_of_[static_cast<std::size_t>(track)] = detection;
+        track_of_[static_cast<std::size_t>(detection)] = track;
+    };
+    if (last - first == 1) {
+        match(pairs_[first].track, pairs_[first].detection);
+        return;
+    }
+    rows_.clear();
+    columns_.clear();
+    for (std::size_t i = first; i < last; ++i) {
+        int& row = row_of_[static_cast<std::size_t>(pairs_[i].track)];
+        if (row < 0) {
+            row = static_cast<int>(rows_.size());
+            rows_.push_back(pairs_[i].track);
+        }
+        int& column = column_of_[static_cast<std::size_t>(pairs_[i].detection)];
+        if (column < 0) {
+            column = static_cast<int>(columns_.size());
+            columns_.push_back(pairs_[i].detection);
+        }
+    }
+    // A cell that is no pair costs what leaving both alone costs.
+    cost_.assign(rows_.size() * columns_.size(), unmatched_cost);
+    const auto cell = [&](const Pair& p) -> double& {
+        return cost_[static_cast<std::size_t>(row_of_[static_cast<std::size_t>(p.track)]) * columns_.size() +
+                     static_cast<std::size_t>(column_of_[static_cast<std::size_t>(p.detection)])];
+    };
+    for (std::size_t i = first; i < last; ++i) cell(pairs_[i]) = pairs_[i].cost;
+    const std::vector<int>& column_of_row =
+        hungarian_.solve(cost_, static_cast<int>(rows_.size()), static_cast<int>(columns_.size()));
+    for (std::size_t i = first; i < last; ++i) {
+        const Pair& p = pairs_[i];
+        if (column_of_row[static_cast<std::size_t>(row_of_[static_cast<std::size_t>(p.track)])] ==
+            column_of_[static_cast<std::size_t>(p.detection)]) {
+            match(p.track, p.detection);
+        }
+    }
+}
+
+}  // namespace dlod

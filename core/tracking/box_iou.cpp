@@ -1,0 +1,100 @@
+#include "core/tracking/box_iou.hpp"
+
+#include <algorithm>
+#include <array>
+
+namespace dlod {
+
+namespace {
+
+using Point = Eigen::Vector2d;
+
+/// A convex polygon; four clips of a rectangle leave at most eight corners.
+struct Polygon {
+    std::array<Point, 12> corner;
+    int size = 0;
+    void add(const Point& p) { corner[static_cast<std::size_t>(size++)] = p; }
+    const Point& operator[](int i) const { return corner[static_cast<std::size_t>(i)]; }
+};
+
+/// Keeps the part where normal . p <= offset (Sutherland and Hodgman).
+Polygon clip(const Polygon& in, const Point& normal, double offset) {
+    Polygon out;
+    for (int i = 0; i < in.size; ++i) {
+        const Point& a = in[i];
+        const Point& b = in[i + 1 == in.size ? 0 : i + 1];
+        const double da = normal.dot(a) - offset;
+        const double db = normal.dot(b) - offset;
+        if (da <= 0.0) out.add(a);
+        if ((da < 0.0 && db > 0.0) || (da > 0.0 && db < 0.0)) out.add(a + (b - a) * (da / (da - db)));
+    }
+    return out;
+}
+
+double area(const Polygon& p) {
+    double twice = 0.0;
+    for (int i = 0; i < p.size; ++i) {
+        const Point& a = p[i];
+        const Point& b = p[i + 1 == p.size ? 0 : i + 1];
+        twice += a.x() * b.y() - a.y() * b.x();
+    }
+    return 0.5 * std::abs(twice);
+}
+
+double volume(const OrientedBox& box) {
+    return box.size_m.prod();
+}
+double footprint(const OrientedBox& box) {
+    return box.size_m.x() * box.size_m.y();
+}
+
+}  // namespace
+
+double footprint_intersection_m2(const OrientedBox& a, const OrientedBox& b) {
+    const Point between = b.center_m.head<2>() - a.center_m.head<2>();
+    // Circumscribed circles that do not meet: the usual case, and no trigonometry.
+    const double reach = 0.5 * (a.size_m.head<2>().norm() + b.size_m.head<2>().norm());
+    if (between.squaredNorm() >= reach * reach) return 0.0;
+
+    // In the axes of a, about its centre.
+    const double ca = std::cos(a.yaw_rad), sa = std::sin(a.yaw_rad);
+    const Point center(ca * between.x() + sa * between.y(), -sa * between.x() + ca * between.y());
+    const double c = std::cos(b.yaw_rad - a.yaw_rad), s = std::sin(b.yaw_rad - a.yaw_rad);
+    const Point along = 0.5 * b.size_m.x() * Point(c, s);
+    const Point across = 0.5 * b.size_m.y() * Point(-s, c);
+    Polygon p;
+    p.add(center + along + across);
+    p.add(center - along + across);
+    p.add(center - along - across);
+    p.add(center + along - across);
+    p = clip(p, Point(1.0, 0.0), 0.5 * a.size_m.x());
+    p = clip(p, Point(-1.0, 0.0), 0.5 * a.size_m.x());
+    p = clip(p, Point(0.0, 1.0), 0.5 * a.size_m.y());
+    p = clip(p, Point(0.0, -1.0), 0.5 * a.size_m.y());
+    return area(p);
+}
+
+double footprint_iou(const OrientedBox& a, const OrientedBox& b) {
+    const double both = footprint_intersection_m2(a, b);
+    const double either = footprint(a) + footprint(b) - both;
+    return either > 0.0 ? both / either : 0.0;
+}
+
+double box_iou(const OrientedBox& a, const OrientedBox& b) {
+    const double top = std::min(a.center_m.z() + 0.5 * a.size_m.z(), b.center_m.z() + 0.5 * b.size_m.z());
+    const double bottom = std::max(a.center_m.z() - 0.5 * a.size_m.z(), b.center_m.z() - 0.5 * b.size_m.z());
+    if (top <= bottom) return 0.0;
+    const double both = footprint_intersection_m2(a, b) * (top - bottom);
+    const double either = volume(a) + volume(b) - both;
+    return either > 0.0 ? both / either : 0.0;
+}
+
+double footprint_distance_m(const OrientedBox& box, const Eigen::Vector3d& point_m) {
+    const Eigen::Vector3d d = point_m - box.center_m;
+    const double c = std::cos(box.yaw_rad), s = std::sin(box.yaw_rad);
+    const double u = std::max(0.0, std::abs(c * d.x() + s * d.y()) - 0.5 * box.size_m.x());
+    const double v = std::max(0.0, std::abs(-s * d.x() + c * d.y()) - 0.5 * box.size_m.y());
+    return std::hypot(u, v);
+}
+
+}  // namespace dlod

@@ -1,0 +1,79 @@
+#include "core/tracking/dynamic_state.hpp"
+
+#include <algorithm>
+
+namespace dlod {
+
+namespace {
+
+constexpr int kMinTested = 5;          // points: fewer say nothing about free space
+constexpr double kPatience = 10.0;     // tested points that count for half of full trust
+constexpr double kMaxLogOdds = 8.0;    // bounds keep a belief reversible
+constexpr double kMaxStep = 3.0;       // one frame alone never decides
+constexpr double kMovedAgain_m = 0.2;  // registered displacement that sets a rested object moving
+
+}  // namespace
+
+double free_share(const MotionCues& cues) {
+    const int tested = cues.free_points + cues.occupied_points;
+    return tested < kMinTested ? -1.0 : static_cast<double>(cues.free_points) / tested;
+}
+
+double motion_log_odds(const MotionCues& cues, const DynamicStateConfig& config) {
+    double sum = 0.0;
+    if (config.use_free_space) {
+        const double share = free_share(cues);
+        if (share >= 0.0) {
+            const double tested = cues.free_points + cues.occupied_points;
+            const double known = tested / (tested + cues.unknown_points);
+            sum += config.free_weight * (share - config.free_fraction) * known * tested / (tested + kPatience);
+        }
+    }
+    if (config.use_residual && cues.residual_points > 0 && cues.height_m > 0.0) {
+        const double ratio = cues.average_residual_m / std::max(1e-3, config.theta_res * cues.height_m);
+        sum += config.residual_weight * std::clamp(ratio - 1.0, -1.0, 2.0);
+    }
+    if (config.use_displacement) sum += config.displacement_weight * cues.displacement_log_odds;
+    return std::clamp(sum, -kMaxStep, kMaxStep);
+}
+
+bool MotionBelief::update(const MotionCues& cues, const DynamicStateConfig& config) {
+    ++detections_;
+    const bool was_dynamic = state_ == DynamicState::kDynamic;
+    const bool paper = config.use_residual && !config.use_free_space && !config.use_displacement;
+    state_ = paper ? by_paper(cues, config) : fused(cues, config);
+    return state_ == DynamicState::kDynamic && !was_dynamic;
+}
+
+DynamicState MotionBelief::by_paper(const MotionCues& cues, const DynamicStateConfig& config) const {
+    if (state_ == DynamicState::kDynamic) return state_;
+    if (detections_ >= config.n_min && cues.average_residual_m >= config.theta_res * cues.height_m &&
+        cues.shift_m >= config.theta_disp_m) {
+        return DynamicState::kDynamic;
+    }
+    return detections_ >= config.n_max ? DynamicState::kStatic : state_;
+}
+
+DynamicState MotionBelief::fused(const MotionCues& cues, const DynamicStateConfig& config) {
+    log_odds_ = std::clamp(log_odds_ + motion_log_odds(cues, config), config.static_log_odds - 0.5, kMaxLogOdds);
+    if (state_ == DynamicState::kDynamic) {
+        rest_s_ = cues.moved_m < config.rest_speed_mps ? rest_s_ + cues.dt_s : 0.0;
+        rested_ = rest_s_ >= config.rest_time_s;
+        const bool mistaken = log_odds_ <= config.static_log_odds;
+        if (!rested_ && !mistaken) return state_;
+        rest_s_ = 0.0;
+        log_odds_ = std::min(log_odds_, 0.0);
+        return DynamicState::kStatic;
+    }
+    // Where a rested object stands, free space was seen before it came: that says nothing of now.
+    const bool moves = rested_ ? cues.moved_m > kMovedAgain_m : log_odds_ >= config.dynamic_log_odds;
+    if (moves && detections_ >= config.min_hits) {
+        rested_ = false;
+        log_odds_ = std::max(log_odds_, config.dynamic_log_odds);
+        return DynamicState::kDynamic;
+    }
+    const bool waited = detections_ >= config.n_max && log_odds_ < 0.5 * config.dynamic_log_odds;
+    return waited || log_odds_ <= config.static_log_odds ? DynamicState::kStatic : state_;
+}
+
+}  // namespace dlod

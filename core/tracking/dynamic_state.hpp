@@ -1,0 +1,54 @@
+// Dynamic state of a track: undefined, static or dynamic (paper, Sec. "Dynamic State Update").
+//
+// With the residual as the only cue this is the paper's rule: dynamic, for good, after n_min detections, an average
+// residual of at least theta_res * h_S (Eq. 6) and a shift of theta_disp from where the track began; static after n_max
+// detections. With more cues each detection adds to the log-odds of motion, and the decision can be taken back.
+#pragma once
+
+#include "core/tracking/tracking_config.hpp"
+#include "core/types/track.hpp"
+
+namespace dlod {
+
+/// What one detection says about motion.
+struct MotionCues {
+    double average_residual_m = 0.0;
+    int residual_points = 0;
+    double height_m = 0.0;    ///< h_S of Eq. 6
+    int free_points = 0;      ///< pixels where earlier frames saw free space
+    int occupied_points = 0;  ///< pixels where they saw a surface
+    int unknown_points = 0;
+    double shift_m = 0.0;                ///< of the box centre from the track's first position, ground plane
+    double displacement_log_odds = 0.0;  ///< of "moved" against "stayed", from the registration of its own points
+    double moved_m = 0.0;                ///< registered displacement within the last second, less its uncertainty
+    double dt_s = 0.0;                   ///< since the detection before
+};
+
+/// Share of the tested points that lie where free space was seen; negative where too few were tested to tell.
+double free_share(const MotionCues& cues);
+
+/// Log-odds of motion that one detection adds, all cues that are switched on together.
+double motion_log_odds(const MotionCues& cues, const DynamicStateConfig& config);
+
+/// The belief about one track.
+class MotionBelief {
+  public:
+    DynamicState state() const { return state_; }
+    double log_odds() const { return log_odds_; }
+    int detections() const { return detections_; }
+
+    /// Takes in one detection; returns true where the track has just become dynamic.
+    bool update(const MotionCues& cues, const DynamicStateConfig& config);
+
+  private:
+    DynamicState by_paper(const MotionCues& cues, const DynamicStateConfig& config) const;
+    DynamicState fused(const MotionCues& cues, const DynamicStateConfig& config);
+
+    DynamicState state_ = DynamicState::kUndefined;
+    double log_odds_ = 0.0;
+    double rest_s_ = 0.0;
+    int detections_ = 0;
+    bool rested_ = false;  ///< it was dynamic and came to rest: only a displacement moves it again
+};
+
+}  // namespace dlod

@@ -1,0 +1,123 @@
+#include "core/tracking/kalman_filter.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/tracking/bounding_box.hpp"
+
+namespace dlod {
+
+namespace {
+
+constexpr int kMeasured = 7;
+using MeasurementCovariance = Eigen::Matrix<double, kMeasured, kMeasured>;
+
+MeasurementCovariance noise_of(const BoxMeasurement& m) {
+    MeasurementCovariance R = MeasurementCovariance::Zero();
+    R.topLeftCorner<2, 2>() = m.plane_covariance;
+    R(2, 2) = m.z_sd_m * m.z_sd_m;
+    R(3, 3) = m.yaw_sd_rad * m.yaw_sd_rad;
+    R.diagonal().tail<3>() = m.size_sd_m.cwiseAbs2();
+    return R;
+}
+
+}  // namespace
+
+KalmanFilter::KalmanFilter(const BoxMeasurement& first, const KalmanConfig& config) {
+    state_ << first.box.center_m, wrap_angle(first.box.yaw_rad), first.box.size_m, Eigen::Vector3d::Zero();
+    covariance_.setZero();
+    covariance_.topLeftCorner<kMeasured, kMeasured>() = noise_of(first);
+    covariance_(kVx, kVx) = covariance_(kVy, kVy) = config.birth_velocity_sd_mps * config.birth_velocity_sd_mps;
+    covariance_(kVz, kVz) = config.birth_vertical_velocity_sd_mps * config.birth_vertical_velocity_sd_mps;
+}
+
+void KalmanFilter::predict(double dt_s, const KalmanConfig& config) {
+    const double dt = std::max(0.0, dt_s);
+    state_.head<3>() += dt * state_.segment<3>(kVx);
+
+    // F P F^T with F = I + dt (position, velocity): whole rows, then whole columns.
+    covariance_.topRows<3>() += dt * covariance_.bottomRows<3>();
+    covariance_.leftCols<3>() += dt * covariance_.rightCols<3>();
+
+    // Accelerations are white: their integral over dt is the noise of velocity, the double integral that of position.
+    for (int i = 0; i < 3; ++i) {
+        const double a = i < 2 ? config.acceleration_sd_mps2 : config.vertical_acceleration_sd_mps2;
+        const double q = a * a;
+        covariance_(i, i) += q * dt * dt * dt * dt / 4.0;
+        covariance_(i, kVx + i) += q * dt * dt * dt / 2.0;
+        covariance_(kVx + i, i) += q * dt * dt * dt / 2.0;
+        covariance_(kVx + i, kVx + i) += q * dt * dt;
+    }
+    covariance_(kYaw, kYaw) += config.yaw_rate_sd_radps * config.yaw_rate_sd_radps * dt * dt;
+    for (int i : {kLength, kWidth, kHeight})
+        covariance_(i, i) += config.size_rate_sd_mps * config.size_rate_sd_mps * dt * dt;
+}
+
+void KalmanFilter::update(const BoxMeasurement& m, const KalmanConfig& config) {
+    // H = [I7 | 0] and, as the points are older than the stamp, -age * velocity on the position.
+    Eigen::Matrix<double, kMeasured, kStates> H = Eigen::Matrix<double, kMeasured, kStates>::Identity();
+    for (int i = 0; i < 3; ++i) H(i, kVx + i) = -m.age_s;
+
+    Eigen::Matrix<double, kMeasured, 1> innovation;
+    innovation << m.box.center_m - (state_.head<3>() - m.age_s * state_.segment<3>(kVx)),
+        std::remainder(m.box.yaw_rad - state_(kYaw), std::numbers::pi), m.box.size_m - state_.segment<3>(kLength);
+
+    const MeasurementCovariance R = noise_of(m);
+    const Eigen::Matrix<double, kStates, kMeasured> PHt = covariance_ * H.transpose();
+    const Eigen::LLT<MeasurementCovariance> S(H * PHt + R);
+    const Eigen::Matrix<double, kStates, kMeasured> K = S.solve(PHt.transpose()).transpose();
+    state_ += K * innovation;
+    const Covariance I_KH = Covariance::Identity() - K * H;
+    covariance_ = I_KH * covariance_ * I_KH.transpose() + K * R * K.transpose();
+    covariance_ = (0.5 * (covariance_ + covariance_.transpose())).eval();
+
+    state_(kYaw) = wrap_angle(state_(kYaw));
+    state_.segment<3>(kLength) = state_.segment<3>(kLength).cwiseMax(config.min_size_m);
+    const double speed = state_.segment<3>(kVx).norm();
+    if (speed > config.max_speed_mps) state_.segment<3>(kVx) *= config.max_speed_mps / speed;
+}
+
+void KalmanFilter::align_axes(double reference_yaw_rad) {
+    const double quarter = 0.5 * std::numbers::pi;
+    const double turns = std::round((reference_yaw_rad - state_(kYaw)) / quarter);
+    state_(kYaw) = wrap_angle(state_(kYaw) + turns * quarter);
+    if (std::abs(std::remainder(turns, 2.0)) < 0.5) return;
+    std::swap(state_(kLength), state_(kWidth));
+    covariance_.row(kLength).swap(covariance_.row(kWidth));
+    covariance_.col(kLength).swap(covariance_.col(kWidth));
+}
+
+double KalmanFilter::plane_distance2(const Eigen::Vector2d& position_m, double age_s,
+                                     const Eigen::Matrix2d& covariance) const {
+    const Eigen::Vector2d innovation = position_m - (state_.head<2>() - age_s * state_.segment<2>(kVx));
+    const Eigen::Matrix2d cross = covariance_.block<2, 2>(kX, kVx);
+    const Eigen::Matrix2d S = covariance_.topLeftCorner<2, 2>() - age_s * (cross + cross.transpose()) +
+                              age_s * age_s * covariance_.block<2, 2>(kVx, kVx) + covariance;
+    return innovation.dot(S.llt().solve(innovation));
+}
+
+OrientedBox KalmanFilter::box() const {
+    OrientedBox box;
+    box.center_m = state_.head<3>();
+    box.yaw_rad = state_(kYaw);
+    box.size_m = state_.segment<3>(kLength);
+    return box;
+}
+
+double KalmanFilter::velocity_sd() const {
+    const double a = covariance_(kVx, kVx), b = covariance_(kVy, kVy), c = covariance_(kVx, kVy);
+    return std::sqrt(0.5 * (a + b) + std::hypot(0.5 * (a - b), c));
+}
+
+Eigen::Matrix<double, 6, 6> KalmanFilter::motion_covariance() const {
+    Eigen::Matrix<double, 6, 6> out;
+    out.topLeftCorner<3, 3>() = covariance_.topLeftCorner<3, 3>();
+    out.topRightCorner<3, 3>() = covariance_.block<3, 3>(kX, kVx);
+    out.bottomLeftCorner<3, 3>() = covariance_.block<3, 3>(kVx, kX);
+    out.bottomRightCorner<3, 3>() = covariance_.block<3, 3>(kVx, kVx);
+    return out;
+}
+
+}  // namespace dlod

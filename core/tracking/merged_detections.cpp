@@ -1,0 +1,109 @@
+#include "core/tracking/merged_detections.hpp"
+
+#include <algorithm>
+
+#include "core/tracking/box_iou.hpp"
+
+namespace dlod {
+
+namespace {
+
+constexpr double kInside_m = 0.15;    // the middle of a covered track lies at most this far outside of the detection
+constexpr double kLarger = 1.35;      // a detection of several objects has a footprint that much larger than one's
+constexpr double kSameObject = 0.35;  // tracks that share more of their footprints are one object seen twice
+constexpr std::size_t kMinPart = 10;  // pixels
+
+double area(const OrientedBox& box) {
+    return box.size_m.x() * box.size_m.y();
+}
+
+bool covers(const Detection& detection, const OrientedBox& box) {
+    return footprint_distance_m(detection.box, box.center_m) < kInside_m &&
+           std::abs(detection.box.center_m.z() - box.center_m.z()) < 0.5 * (detection.box.size_m.z() + box.size_m.z());
+}
+
+bool same_object(const OrientedBox& a, const OrientedBox& b) {
+    return footprint_intersection_m2(a, b) > kSameObject * std::min(area(a), area(b));
+}
+
+}  // namespace
+
+void MergedDetections::divide(Frame& frame, DetectionShapes& shapes, std::span<const ExpectedTrack> tracks) {
+    const std::size_t count = frame.detection.detections.size();
+    for (std::size_t i = 0; i < count; ++i) {
+        const Detection& detection = frame.detection.detections[i];
+        covered_.clear();
+        double largest = 0.0;
+        for (std::size_t t = 0; t < tracks.size(); ++t) {
+            if (!tracks[t].steady || !covers(detection, tracks[t].visible)) continue;
+            const bool twice = std::any_of(covered_.begin(), covered_.end(), [&](std::size_t other) {
+                return same_object(tracks[t].visible, tracks[other].visible);
+            });
+            if (twice) continue;
+            covered_.push_back(t);
+            largest = std::max(largest, area(tracks[t].visible));
+        }
+        if (covered_.size() > 1 && area(detection.box) > kLarger * largest) divide_one(frame, shapes, tracks, i);
+    }
+}
+
+void MergedDetections::divide_one(Frame& frame, DetectionShapes& shapes, std::span<const ExpectedTrack> tracks,
+                                  std::size_t index) {
+    auto& detections = frame.detection.detections;
+    const Detection whole = detections[index];
+    const PointSpan points = shapes.points(whole);
+    owner_.resize(whole.count);
+    counts_.assign(covered_.size(), 0);
+    for (std::size_t i = 0; i < whole.count; ++i) {
+        const Eigen::Vector3d p = shapes.origin() + Eigen::Vector3d(points.x[i], points.y[i], points.z[i]);
+        double best = 0.0;
+        for (std::size_t k = 0; k < covered_.size(); ++k) {
+            const OrientedBox& box = tracks[covered_[k]].visible;
+            // Inside of several boxes, the nearer middle decides.
+            const double distance = footprint_distance_m(box, p) + 0.2 * (box.center_m - p).head<2>().norm();
+            if (k == 0 || distance < best) {
+                best = distance;
+                owner_[i] = k;
+            }
+        }
+        ++counts_[owner_[i]];
+    }
+    if (*std::min_element(counts_.begin(), counts_.end()) < kMinPart) return;
+
+    // Stable order by owner, in place of the whole.
+    pixels_.assign(frame.detection.pixels.begin() + whole.first,
+                   frame.detection.pixels.begin() + whole.first + whole.count);
+    x_.assign(points.x.begin(), points.x.end());
+    y_.assign(points.y.begin(), points.y.end());
+    z_.assign(points.z.begin(), points.z.end());
+    LocalPoints& all = shapes.all_points();
+    std::size_t to = whole.first;
+    for (std::size_t k = 0; k < covered_.size(); ++k) {
+        Detection part = whole;
+        part.first = static_cast<std::uint32_t>(to);
+        part.count = static_cast<std::uint32_t>(counts_[k]);
+        const double share = static_cast<double>(counts_[k]) / whole.count;
+        const auto shared = [&](int n) { return static_cast<int>(share * n + 0.5); };
+        part.residual_points = shared(whole.residual_points);
+        part.free_points = shared(whole.free_points);
+        part.occupied_points = shared(whole.occupied_points);
+        part.unknown_points = shared(whole.unknown_points);
+        for (std::size_t i = 0; i < whole.count; ++i) {
+            if (owner_[i] != k) continue;
+            frame.detection.pixels[to] = pixels_[i];
+            all.x[to] = x_[i];
+            all.y[to] = y_[i];
+            all.z[to] = z_[i];
+            ++to;
+        }
+        const std::size_t at = k == 0 ? index : detections.size();
+        if (k == 0) {
+            detections[index] = part;
+        } else {
+            detections.push_back(part);
+        }
+        shapes.recompute(frame, at);
+    }
+}
+
+}  // namespace dlod

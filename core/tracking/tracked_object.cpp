@@ -1,0 +1,203 @@
+#include "core/tracking/tracked_object.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/tracking/bounding_box.hpp"
+
+namespace dlod {
+
+namespace {
+
+constexpr int kYoungHits = 3;              // detections before a velocity means something
+constexpr double kHeadingSpeed_mps = 0.7;  // slower objects may move sideways
+constexpr double kElongated = 1.6;         // a principal axis says where an object points
+constexpr double kPastWindow_s = 1.0;
+
+const DetectionShape& largest_shape(const DetectionShapes& shapes, const Sighting& sighting) {
+    return shapes[sighting.detections.front()];
+}
+
+BoxMeasurement first_measurement(const Frame& frame, const DetectionShapes& shapes, const Sighting& sighting,
+                                 const OrientedBox& visible, const KalmanConfig& config) {
+    BoxMeasurement m = complete_extent(visible, assumed_box(visible, sighting.visibility), sighting.visibility, config);
+    const DetectionShape& shape = largest_shape(shapes, sighting);
+    m.age_s = shape.age_s;
+    m.yaw_sd_rad = shape.axis.elongation > kElongated ? 0.2 : 1.0;
+    m.size_sd_m = m.size_sd_m.cwiseMin(0.5);
+    (void)frame;
+    return m;
+}
+
+}  // namespace
+
+OrientedBox TrackedObject::visible_box(const Frame& frame, const DetectionShapes& shapes, const Sighting& sighting,
+                                       double yaw_rad) {
+    const auto box_of = [&](std::size_t d) {
+        return box_at_yaw(shapes.points(frame.detection.detections[d]), shapes.origin(), yaw_rad);
+    };
+    OrientedBox all = box_of(sighting.detections.front());
+    const Eigen::Matrix3d R = Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+    for (std::size_t d : sighting.detections.subspan(1)) {
+        const OrientedBox part = box_of(d);
+        const Eigen::Vector3d offset = R.transpose() * (part.center_m - all.center_m);
+        const Eigen::Vector3d low = (-0.5 * all.size_m).cwiseMin(offset - 0.5 * part.size_m);
+        const Eigen::Vector3d high = (0.5 * all.size_m).cwiseMax(offset + 0.5 * part.size_m);
+        all.center_m += R * (0.5 * (low + high));
+        all.size_m = high - low;
+    }
+    return all;
+}
+
+TrackedObject::TrackedObject(std::uint32_t id, const Frame& frame, const DetectionShapes& shapes,
+                             const Sighting& sighting, const TrackingConfig& config)
+    : id_(id),
+      filter_(first_measurement(frame, shapes, sighting,
+                                visible_box(frame, shapes, sighting, largest_shape(shapes, sighting).axis.yaw_rad),
+                                config.filter),
+              config.filter),
+      origin_m_(filter_.box().center_m) {
+    std::vector<OrientedBox> nothing_to_clear;
+    see(frame, shapes, sighting, config, nothing_to_clear);
+}
+
+void TrackedObject::predict(double dt_s, const TrackingConfig& config) {
+    filter_.predict(dt_s, config.filter);
+    unseen_s_ += dt_s;
+    for (std::size_t i = 0; i < past_size_; ++i) past_[i].age_s += dt_s;
+    seen_now_ = false;
+    ++age_;
+}
+
+std::pair<double, double> TrackedObject::measured_yaw(const PrincipalAxis& axis) {
+    const Eigen::Vector3d velocity = filter_.velocity();
+    const double speed = filter_.speed();
+    const double sd = filter_.velocity_sd();
+    const OrientedBox box = filter_.box();
+    const bool long_object = box.size_m.head<2>().maxCoeff() > 1.5 && axis.elongation > kElongated;
+    if (speed > kHeadingSpeed_mps && speed > 3.0 * sd) {
+        const double heading = std::atan2(velocity.y(), velocity.x());
+        filter_.align_axes(heading);
+        // The sides of a long object are known better than its heading.
+        if (long_object && std::abs(std::remainder(axis.yaw_rad - heading, std::numbers::pi)) < 0.5)
+            return {axis.yaw_rad, 0.1};
+        return {heading, std::max(0.1, sd / speed)};
+    }
+    if (long_object) {
+        filter_.align_axes(resolve_yaw(axis.yaw_rad, box.yaw_rad));
+        return {axis.yaw_rad, 0.15};
+    }
+    return {box.yaw_rad, 10.0};
+}
+
+void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const Sighting& sighting,
+                        const TrackingConfig& config, std::vector<OrientedBox>& cleared) {
+    const DetectionShape& shape = largest_shape(shapes, sighting);
+    if (hits_ > 0) {
+        const auto [yaw, yaw_sd] = measured_yaw(shape.axis);
+        const OrientedBox remembered = filter_.box();
+        const OrientedBox visible = visible_box(frame, shapes, sighting, remembered.yaw_rad);
+        BoxMeasurement m = complete_extent(visible, remembered, sighting.visibility, config.filter);
+        m.age_s = shape.age_s;
+        m.box.yaw_rad = yaw;
+        m.yaw_sd_rad = yaw_sd;
+        filter_.update(m, config.filter);
+    }
+    visible_ = visible_box(frame, shapes, sighting, filter_.box().yaw_rad);
+    // At the stamp, as the filter's centre.
+    visible_.center_m += shape.age_s * filter_.velocity() - filter_.box().center_m;
+
+    MotionCues cues;
+    double residual_sum = 0.0;
+    points_ = 0;
+    for (std::size_t d : sighting.detections) {
+        const Detection& part = frame.detection.detections[d];
+        residual_sum += part.average_residual_m * part.residual_points;
+        cues.residual_points += part.residual_points;
+        cues.free_points += part.free_points;
+        cues.occupied_points += part.occupied_points;
+        cues.unknown_points += part.unknown_points;
+        points_ += static_cast<int>(part.count);
+    }
+    cues.average_residual_m = cues.residual_points > 0 ? residual_sum / cues.residual_points : 0.0;
+    cues.height_m = visible_.size_m.z();
+    cues.shift_m = (filter_.box().center_m - origin_m_).head<2>().norm();
+    cues.dt_s = unseen_s_;
+    cues.moved_m = moved_m();
+    remember_position();
+
+    ++hits_;
+    misses_ = 0;
+    unseen_frames_ = 0;
+    unseen_s_ = 0.0;
+    seen_now_ = true;
+    residual_m_ = cues.average_residual_m;
+    if (belief_.update(cues, config.state)) {
+        history_.release(cleared);
+        cleared.push_back(filter_.box());
+    } else if (belief_.state() != DynamicState::kDynamic) {
+        OrientedBox world = visible_;
+        world.center_m += filter_.box().center_m;
+        history_.add(world);
+    }
+}
+
+void TrackedObject::miss(bool occluded) {
+    if (!occluded) ++misses_;
+    ++unseen_frames_;
+}
+
+bool TrackedObject::dead(const TrackingConfig& config) const {
+    if (unseen_frames_ > config.max_misses_occluded) return true;
+    const bool established = belief_.state() == DynamicState::kDynamic || hits_ > config.max_misses;
+    return misses_ > (established ? config.max_misses : config.max_misses_undecided);
+}
+
+double TrackedObject::moved_m() const {
+    double moved = 0.0;
+    const Eigen::Vector2d now = filter_.box().center_m.head<2>();
+    const double sd = std::sqrt(filter_.covariance().topLeftCorner<2, 2>().trace());
+    for (std::size_t i = 0; i < past_size_; ++i) {
+        if (past_[i].age_s > kPastWindow_s) break;
+        moved = std::max(moved, (now - past_[i].position_m).norm() - 2.0 * std::hypot(sd, past_[i].sd_m));
+    }
+    return moved;
+}
+
+void TrackedObject::remember_position() {
+    past_size_ = std::min(past_size_ + 1, kPast);
+    std::copy_backward(past_.begin(), past_.begin() + static_cast<std::ptrdiff_t>(past_size_) - 1,
+                       past_.begin() + static_cast<std::ptrdiff_t>(past_size_));
+    past_[0] = {0.0, filter_.box().center_m.head<2>(), std::sqrt(filter_.covariance().topLeftCorner<2, 2>().trace())};
+}
+
+ExpectedTrack TrackedObject::expected() const {
+    ExpectedTrack e;
+    e.visible = visible_;
+    e.visible.center_m += filter_.box().center_m;
+    e.filter = &filter_;
+    e.points = points_;
+    e.young = hits_ < kYoungHits;
+    e.steady = steady();
+    e.dt_s = unseen_s_;
+    e.motion = std::clamp(belief_.log_odds() / 3.0, -1.0, 1.0);
+    return e;
+}
+
+Track TrackedObject::published() const {
+    Track t;
+    t.id = id_;
+    t.state = belief_.state();
+    t.box = filter_.box();
+    t.velocity_mps = filter_.velocity();
+    t.covariance = filter_.motion_covariance();
+    t.points = seen_now_ ? points_ : 0;
+    t.hits = hits_;
+    t.misses = unseen_frames_;
+    t.age = age_;
+    t.residual_m = residual_m_;
+    return t;
+}
+
+}  // namespace dlod

@@ -1,0 +1,85 @@
+// One track: its filter, what it remembers of the object's extent and past, and the belief that it moves.
+#pragma once
+
+#include <array>
+#include <span>
+
+#include "core/removal/box_history.hpp"
+#include "core/tracking/association.hpp"
+#include "core/tracking/detection_shapes.hpp"
+#include "core/tracking/dynamic_state.hpp"
+#include "core/tracking/object_extent.hpp"
+
+namespace dlod {
+
+/// The detections of one frame that belong to one track: an occluder may split an object into several.
+struct Sighting {
+    std::span<const std::size_t> detections;  ///< indices into the frame's, the largest part first; at least one
+    Visibility visibility;
+};
+
+class TrackedObject {
+  public:
+    /// Born from its first sighting.
+    TrackedObject(std::uint32_t id, const Frame& frame, const DetectionShapes& shapes, const Sighting& sighting,
+                  const TrackingConfig& config);
+
+    /// Moves on to the next frame's stamp.
+    void predict(double dt_s, const TrackingConfig& config);
+
+    /// Takes in this frame's sighting. Where the object has just turned dynamic, the boxes of its past go to `cleared`.
+    void see(const Frame& frame, const DetectionShapes& shapes, const Sighting& sighting, const TrackingConfig& config,
+             std::vector<OrientedBox>& cleared);
+
+    /// No detection in this frame. @param occluded something nearer hides it: it does not age
+    void miss(bool occluded);
+
+    bool dead(const TrackingConfig& config) const;
+    /// Seen often enough to believe in it as an object of its own.
+    bool steady() const { return hits_ >= 3; }
+
+    ExpectedTrack expected() const;
+    Track published() const;
+    std::uint32_t id() const { return id_; }
+    DynamicState state() const { return belief_.state(); }
+    OrientedBox box() const { return filter_.box(); }
+    bool seen() const { return seen_now_; }  ///< in this frame
+    int misses() const { return misses_; }
+    int hits() const { return hits_; }
+
+  private:
+    struct PastPosition {
+        double age_s = 0.0;  ///< before now
+        Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
+        double sd_m = 0.0;
+    };
+
+    /// Which way the object points, from its motion or its shape; aligns the filter's axes and returns the noise.
+    std::pair<double, double> measured_yaw(const PrincipalAxis& axis);
+    double moved_m() const;
+    void remember_position();
+    /// Visible box of all parts at one yaw.
+    static OrientedBox visible_box(const Frame& frame, const DetectionShapes& shapes, const Sighting& sighting,
+                                   double yaw_rad);
+
+    static constexpr std::size_t kPast = 12;
+
+    std::uint32_t id_;
+    KalmanFilter filter_;
+    MotionBelief belief_;
+    BoxHistory history_;
+    OrientedBox visible_;  ///< of the last sighting; its centre is an offset from the filter's
+    Eigen::Vector3d origin_m_;
+    std::array<PastPosition, kPast> past_;  ///< newest first
+    std::size_t past_size_ = 0;
+    double unseen_s_ = 0.0;
+    double residual_m_ = 0.0;
+    int points_ = 0;  ///< of the last sighting
+    bool seen_now_ = true;
+    int hits_ = 0;
+    int misses_ = 0;
+    int unseen_frames_ = 0;
+    int age_ = 0;
+};
+
+}  // namespace dlod
