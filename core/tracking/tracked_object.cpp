@@ -19,14 +19,13 @@ const DetectionShape& largest_shape(const DetectionShapes& shapes, const Sightin
     return shapes[sighting.detections.front()];
 }
 
-BoxMeasurement first_measurement(const Frame& frame, const DetectionShapes& shapes, const Sighting& sighting,
-                                 const OrientedBox& visible, const KalmanConfig& config) {
+BoxMeasurement first_measurement(const DetectionShapes& shapes, const Sighting& sighting, const OrientedBox& visible,
+                                 const KalmanConfig& config) {
     BoxMeasurement m = complete_extent(visible, assumed_box(visible, sighting.visibility), sighting.visibility, config);
     const DetectionShape& shape = largest_shape(shapes, sighting);
     m.age_s = shape.age_s;
     m.yaw_sd_rad = shape.axis.elongation > kElongated ? 0.2 : 1.0;
     m.size_sd_m = m.size_sd_m.cwiseMin(0.5);
-    (void)frame;
     return m;
 }
 
@@ -53,7 +52,7 @@ OrientedBox TrackedObject::visible_box(const Frame& frame, const DetectionShapes
 TrackedObject::TrackedObject(std::uint32_t id, const Frame& frame, const DetectionShapes& shapes,
                              const Sighting& sighting, const TrackingConfig& config)
     : id_(id),
-      filter_(first_measurement(frame, shapes, sighting,
+      filter_(first_measurement(shapes, sighting,
                                 visible_box(frame, shapes, sighting, largest_shape(shapes, sighting).axis.yaw_rad),
                                 config.filter),
               config.filter),
@@ -76,7 +75,7 @@ std::pair<double, double> TrackedObject::measured_yaw(const PrincipalAxis& axis)
     const double sd = filter_.velocity_sd();
     const OrientedBox box = filter_.box();
     const bool long_object = box.size_m.head<2>().maxCoeff() > 1.5 && axis.elongation > kElongated;
-    if (speed > kHeadingSpeed_mps && speed > 3.0 * sd) {
+    if (speed > kHeadingSpeed_mps && speed > 2.0 * sd) {
         const double heading = std::atan2(velocity.y(), velocity.x());
         filter_.align_axes(heading);
         // The sides of a long object are known better than its heading.

@@ -6,7 +6,7 @@
 namespace dlod {
 
 struct KalmanConfig {
-    double acceleration_sd_mps2 = 3.0;
+    double acceleration_sd_mps2 = 2.0;
     double vertical_acceleration_sd_mps2 = 0.5;
     double yaw_rate_sd_radps = 1.0;
     double size_rate_sd_mps = 0.1;

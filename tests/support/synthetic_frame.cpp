@@ -23,7 +23,8 @@ void SyntheticFrame::next(double dt_s) {
     frame.header.stamp_ns += static_cast<std::int64_t>(std::llround(1e9 * dt_s));
     for (auto& time : frame.columns.time_ns) time = frame.header.stamp_ns;
     frame.raw.range_mm.fill(0);
-    for (auto* image : {&frame.odometry.x, &frame.odometry.y, &frame.odometry.z, &frame.cloud.range_m}) image->fill(0.0F);
+    for (auto* image : {&frame.odometry.x, &frame.odometry.y, &frame.odometry.z, &frame.cloud.range_m})
+        image->fill(0.0F);
     frame.prepared.ground.fill(0);
     frame.detection.clear();
     next_pixel_ = 0;
@@ -38,8 +39,8 @@ std::vector<PixelIndex> SyntheticFrame::place(const Cylinder& cylinder) {
     for (int i = 0; i < cylinder.points; ++i) {
         const double angle = facing + std::numbers::pi * ((i % kAcross + 0.5) / kAcross - 0.5);
         const double height = cylinder.height_m * (static_cast<double>(i) / std::max(1, cylinder.points - 1));
-        const Eigen::Vector3d world =
-            cylinder.foot_m + Eigen::Vector3d(cylinder.radius_m * std::cos(angle), cylinder.radius_m * std::sin(angle), height);
+        const Eigen::Vector3d world = cylinder.foot_m + Eigen::Vector3d(cylinder.radius_m * std::cos(angle),
+                                                                        cylinder.radius_m * std::sin(angle), height);
         const Eigen::Vector3f p = (T_sensor_world * world).cast<float>();
         const PixelIndex pixel = next_pixel_++;
         frame.odometry.x[pixel] = p.x();

@@ -1,10 +1,10 @@
 // Frames of objects with known truth for tests of tracking, removal and map: no driver, no segmentation.
 #pragma once
 
-#include "core/types/frame.hpp"
-
 #include <cstdint>
 #include <vector>
+
+#include "core/types/frame.hpp"
 
 namespace dlod::test {
 
@@ -16,7 +16,7 @@ struct Cylinder {
     Eigen::Vector3d foot_m = Eigen::Vector3d::Zero();  ///< world frame, at the stamp
     double radius_m = 0.25;
     double height_m = 1.7;
-    bool moving = true;    ///< its points lie where free space was seen before
+    bool moving = true;  ///< its points lie where free space was seen before
     int points = 120;
 };
 

@@ -1,10 +1,10 @@
 #include "core/map/global_map.hpp"
 
-#include "tests/support/synthetic_frame.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
+
+#include "tests/support/synthetic_frame.hpp"
 
 namespace dlod {
 namespace {
@@ -132,7 +132,8 @@ TEST_F(GlobalMapTest, TheOrderOfPointsIsThatOfTheCells) {
     b.finish();
     const auto pa = a.points(), pb = b.points();
     ASSERT_EQ(pa.size(), pb.size());
-    for (std::size_t i = 0; i < pa.size(); ++i) EXPECT_TRUE(pa[i].x == pb[i].x && pa[i].y == pb[i].y && pa[i].z == pb[i].z);
+    for (std::size_t i = 0; i < pa.size(); ++i)
+        EXPECT_TRUE(pa[i].x == pb[i].x && pa[i].y == pb[i].y && pa[i].z == pb[i].z);
 }
 
 }  // namespace

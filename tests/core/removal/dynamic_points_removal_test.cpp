@@ -1,13 +1,15 @@
 #include "core/removal/dynamic_points_removal.hpp"
 
-#include "tests/support/synthetic_frame.hpp"
-
 #include <gtest/gtest.h>
+
+#include "tests/support/synthetic_frame.hpp"
 
 namespace dlod {
 namespace {
 
-std::uint8_t value(PixelLabel label) { return static_cast<std::uint8_t>(label); }
+std::uint8_t value(PixelLabel label) {
+    return static_cast<std::uint8_t>(label);
+}
 
 /// Three objects, dynamic, static and undecided (tracks 7, 8, 9), one that has no track, ground and background.
 class DynamicPointsRemovalTest : public ::testing::Test {
@@ -38,7 +40,8 @@ class DynamicPointsRemovalTest : public ::testing::Test {
         for (PixelIndex p = 0; p < ground + 1; ++p) {
             auto& points = scene.frame.prepared.points;
             points.pixel.push_back(p);
-            for (auto* v : {&points.x, &points.y, &points.z, &points.nx, &points.ny, &points.planarity, &points.time_s}) v->push_back(0.0F);
+            for (auto* v : {&points.x, &points.y, &points.z, &points.nx, &points.ny, &points.planarity, &points.time_s})
+                v->push_back(0.0F);
             points.nz.push_back(1.0F);
         }
         for (int r = 0; r < 3; ++r) {
@@ -58,8 +61,8 @@ class DynamicPointsRemovalTest : public ::testing::Test {
 TEST_F(DynamicPointsRemovalTest, EveryPixelHasItsLabelAndInstance) {
     removal.process(scene.frame, feedback);
     const auto& d = scene.frame.detection;
-    const std::uint8_t expected[] = {value(PixelLabel::kDynamic), value(PixelLabel::kStatic), value(PixelLabel::kUndecided),
-                                     value(PixelLabel::kUndecided)};
+    const std::uint8_t expected[] = {value(PixelLabel::kDynamic), value(PixelLabel::kStatic),
+                                     value(PixelLabel::kUndecided), value(PixelLabel::kUndecided)};
     const std::uint32_t id[] = {7, 8, 9, 0};
     for (std::size_t i = 0; i < 4; ++i) {
         for (PixelIndex p : pixels[i]) {
@@ -91,7 +94,8 @@ TEST_F(DynamicPointsRemovalTest, AnInvalidPoseKnowsNoGroundAndNoMotion) {
     removal.process(scene.frame, feedback);
     for (std::size_t p = 0; p < scene.frame.detection.label.size(); ++p) {
         const std::uint8_t label = scene.frame.detection.label[p];
-        EXPECT_TRUE(label == value(PixelLabel::kNoReturn) || label == value(PixelLabel::kStatic) || label == value(PixelLabel::kUndecided));
+        EXPECT_TRUE(label == value(PixelLabel::kNoReturn) || label == value(PixelLabel::kStatic) ||
+                    label == value(PixelLabel::kUndecided));
     }
     EXPECT_EQ(scene.frame.detection.label[pixels[0][0]], value(PixelLabel::kUndecided));
     EXPECT_TRUE(feedback.moving.empty());

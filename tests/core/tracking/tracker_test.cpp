@@ -1,11 +1,11 @@
 #include "core/tracking/tracker.hpp"
 
-#include "tests/support/synthetic_frame.hpp"
-
 #include <gtest/gtest.h>
 
 #include <map>
 #include <set>
+
+#include "tests/support/synthetic_frame.hpp"
 
 namespace dlod {
 namespace {
@@ -92,7 +92,9 @@ TEST_F(TrackerTest, PeopleWhoMeetKeepTheirIds) {
         tracker.process(scene.frame);
         ASSERT_EQ(scene.frame.detection.tracks.size(), 2U);
         const auto id_of = [&](std::size_t detection) {
-            return scene.frame.detection.tracks[static_cast<std::size_t>(scene.frame.detection.detections[detection].track)].id;
+            return scene.frame.detection
+                .tracks[static_cast<std::size_t>(scene.frame.detection.detections[detection].track)]
+                .id;
         };
         if (k == 0) {
             left = id_of(0);
@@ -216,7 +218,9 @@ TEST_F(TrackerTest, ALateDecisionHandsOutTheWholePast) {
     }
     EXPECT_EQ(scene.frame.detection.tracks[0].state, DynamicState::kDynamic);
     const auto is_cleared = [&](double x) {
-        return std::any_of(cleared.begin(), cleared.end(), [&](const OrientedBox& b) { return b.contains({x - 0.2, 1.9, 0.0}, 0.15); });
+        return std::any_of(cleared.begin(), cleared.end(), [&](const OrientedBox& b) {
+            return b.contains({x - 0.2, 1.9, 0.0}, 0.15);
+        });
     };
     EXPECT_TRUE(is_cleared(4.0));
     EXPECT_TRUE(is_cleared(4.3));
