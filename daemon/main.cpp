@@ -7,6 +7,7 @@
 #include "daemon/commands/commands.hpp"
 #include "daemon/config/option.hpp"
 #include "daemon/output/output_file.hpp"
+#include "daemon/publish/lcm_bus.hpp"
 #include "driver/metadata.hpp"
 #include "driver/packet_source.hpp"
 
@@ -16,7 +17,7 @@ using dlod::daemon::ExitCode;
 
 constexpr const char* kExitCodes =
     "Exit codes: 0 success (replay: the capture's end was reached), 1 failure, 2 command line, 3 configuration or "
-    "metadata, 4 capture or socket, 5 output, 6 LCM.";
+    "metadata, 4 capture or socket, 5 output, 6 LCM, 7 interrupted replay.";
 
 /// Options that stand for one setting each, in the order given.
 void add_setting(CLI::App& command, const std::string& flag, const std::string& key, std::vector<std::string>& settings,
@@ -49,6 +50,14 @@ int main(int argc, char** argv) {
     app.set_version_flag("--version", "dlod " DLOD_VERSION);
     app.require_subcommand(1);
     app.footer(kExitCodes);
+
+    RunArguments run_arguments;
+    auto* run_command = app.add_subcommand("run", "process a live sensor's packets until SIGINT or SIGTERM");
+    add_config_options(*run_command, run_arguments.config);
+    add_setting(*run_command, "--metadata", "sensor.metadata", run_arguments.config.settings, "sensor metadata (JSON)");
+    add_setting(*run_command, "--threads", "pipeline.threads", run_arguments.config.settings, "threads that run the stages");
+    add_setting(*run_command, "--out", "output.folder", run_arguments.config.settings, "folder for result files");
+    add_setting(*run_command, "--lcm", "lcm.url", run_arguments.config.settings, "LCM provider, or none");
 
     ReplayArguments replay_arguments;
     auto* replay_command = app.add_subcommand("replay", "process a capture (pcap, pcapng)");
@@ -87,6 +96,7 @@ int main(int argc, char** argv) {
     }
     try {
         ExitCode code = ExitCode::kSuccess;
+        if (*run_command) code = run(run_arguments);
         if (*replay_command) code = replay(replay_arguments);
         if (*info_command) code = info(info_file, info_metadata);
         if (*check_command) code = check_config(checked, checked_metadata);
@@ -100,6 +110,8 @@ int main(int argc, char** argv) {
         return fail(ExitCode::kInput, error);
     } catch (const OutputError& error) {
         return fail(ExitCode::kOutput, error);
+    } catch (const MessageBusError& error) {
+        return fail(ExitCode::kMessages, error);
     } catch (const std::exception& error) {
         return fail(ExitCode::kFailure, error);
     }

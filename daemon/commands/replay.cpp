@@ -10,8 +10,13 @@
 #include "daemon/commands/load_config.hpp"
 #include "daemon/output/result_writer.hpp"
 #include "daemon/pipeline/pipeline.hpp"
+#include "daemon/publish/frame_publisher.hpp"
+#include "daemon/publish/lcm_bus.hpp"
+#include "daemon/service/log.hpp"
 #include "daemon/service/signals.hpp"
+#include "driver/paced_source.hpp"
 #include "driver/pcap_source.hpp"
+#include "driver/port_selection.hpp"
 
 namespace dlod::daemon {
 namespace {
@@ -43,6 +48,19 @@ std::filesystem::path metadata_of(const ReplayArguments& arguments) {
     return path.replace_extension(".json");
 }
 
+/// Ports as configured, else as the metadata says, else those that the sensor's packets go to.
+std::vector<std::uint16_t> capture_ports(const std::filesystem::path& capture, const driver::SensorInfo& sensor,
+                                         const SensorConfig& config) {
+    const auto or_else = [](int configured, std::uint16_t other) {
+        return configured != 0 ? static_cast<std::uint16_t>(configured) : other;
+    };
+    const auto selected = driver::select_ports(capture, {.lidar_port = or_else(config.lidar_port, sensor.lidar_port),
+                                                         .imu_port = or_else(config.imu_port, sensor.imu_port),
+                                                         .lidar_bytes = sensor.layout().packet_bytes()});
+    for (const auto& warning : selected.warnings) spdlog::warn("{}", warning);
+    return {selected.lidar_port, selected.imu_port};
+}
+
 /// Totals of the run, for people.
 class Summary {
   public:
@@ -63,7 +81,7 @@ class Summary {
             if (value != 0) std::printf(" %.*s %llu", static_cast<int>(name.size()), name.data(), static_cast<unsigned long long>(value));
         };
         source.visit_counters(print_counter);
-        pipeline.ingest().visit_counters(print_counter);
+        pipeline.ingest().counters().visit(print_counter);
         std::printf("\n");
     }
 
@@ -90,17 +108,28 @@ class Summary {
 ExitCode replay(const ReplayArguments& arguments) {
     const auto sensor = driver::load_metadata(metadata_of(arguments));
     const Config config = load_config(arguments.config, &sensor);
-    spdlog::set_level(static_cast<spdlog::level::level_enum>(config.log.level));
+    set_up_log(config.log.level);
     for (const auto& warning : sensor.warnings) spdlog::warn("{}", warning);
 
-    driver::PcapSource source(arguments.capture);
+    const auto ports = capture_ports(arguments.capture, sensor, config.sensor);
+    auto capture = std::make_unique<driver::PcapSource>(arguments.capture, driver::PcapOptions{.ports = ports, .reassembly = {}});
+    const driver::PcapSource& progress_of = *capture;
+    driver::PacedSource source(std::move(capture), arguments.rate);
     std::unique_ptr<ResultWriter> writer;
     if (!config.output.folder.empty()) {
         writer = std::make_unique<ResultWriter>(config.output.folder, static_cast<TimingClock>(config.output.timing));
     }
 
+    std::unique_ptr<LcmBus> bus;
+    std::unique_ptr<FramePublisher> publisher;
+    if (!config.lcm.url.empty() && config.lcm.url != "none") {
+        bus = std::make_unique<LcmBus>(config.lcm.url);
+        publisher = std::make_unique<FramePublisher>(*bus, sensor.model, config.extrinsics.T_base_sensor(), config.lcm.channel_prefix);
+    }
+
     Summary summary;
     FrameSinks sinks;
+    if (publisher) sinks.publish = [&](PipelineFrame& frame) { publisher->publish(frame, frame.header.stamp_ns / 1000); };
     if (writer) sinks.write = [&](PipelineFrame& frame) { writer->write(frame); };
     sinks.finished = [&](const PipelineFrame& frame) { summary.add(frame); };
     SignalWaiter signals;
@@ -114,7 +143,7 @@ ExitCode replay(const ReplayArguments& arguments) {
     bool interrupted = false;
     while (!pipeline.done()) {
         const auto event = signals.wait(pipeline.done_descriptor(), std::chrono::milliseconds(200));
-        progress.show(source.progress(), pipeline.finished_frames(), elapsed());
+        progress.show(progress_of.progress(), pipeline.finished_frames(), elapsed());
         if (event == SignalWaiter::Event::kStop) {
             interrupted = true;
             pipeline.stop();

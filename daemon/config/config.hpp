@@ -40,6 +40,11 @@ struct ExtrinsicsConfig {
     std::array<double, 3> translation_m{0.0, 0.0, 0.0};
     std::array<double, 4> rotation_wxyz{1.0, 0.0, 0.0, 0.0};
 
+    Eigen::Isometry3d T_base_sensor() const {
+        const auto& q = rotation_wxyz;
+        return make_pose(Eigen::Quaterniond(q[0], q[1], q[2], q[3]), Eigen::Vector3d::Map(translation_m.data()));
+    }
+
     template <class V>
     void visit(V& v) {
         v.vector("translation_m", translation_m, Range{-100.0, 100.0}, "m", "position x, y, z of the sensor frame in the base frame");

@@ -12,11 +12,7 @@ Ingest::Ingest(driver::PacketSource& source, const driver::SensorInfo& sensor, c
       intake_(intake),
       events_(events),
       options_(options),
-      builder_(sensor, config, [this] { return acquire(); }, [this](Frame* frame) { emit(frame); }) {
-    std::size_t count = 0;
-    builder_.counters().visit([&](const char*, std::uint64_t) { ++count; });
-    counters_.resize(count);
-}
+      builder_(sensor, config, [this] { return acquire(); }, [this](Frame* frame) { emit(frame); }) {}
 
 void Ingest::run() {
     const std::uint64_t before = emitted_frames();
@@ -46,19 +42,16 @@ void Ingest::run_until_end() {
 bool Ingest::step() {
     if (next_packet_ == batch_.packets.size()) {
         batch_ = source_.next();
+        ++steps_;
         next_packet_ = 0;
         if (options_.paced) wall_start_ns_ = StepTimer::now_ns(CLOCK_MONOTONIC);
         log_warnings();
         if (batch_.status == driver::SourceStatus::kEnd || batch_.status == driver::SourceStatus::kStopped) {
             builder_.flush();
-            publish_counters();
             ended_.store(true);
             return false;
         }
-        if (batch_.packets.empty()) {
-            publish_counters();
-            return false;
-        }
+        if (batch_.packets.empty()) return false;
         last_packet_ns_.store(StepTimer::now_ns(CLOCK_MONOTONIC), std::memory_order_relaxed);
     }
     // Live, the whole batch at once: nothing waits for frames. Replay, packet by packet: each may need some.
@@ -83,7 +76,6 @@ void Ingest::emit(Frame* frame) {
     charge_clocks();
     emitted->times = std::exchange(times_, {});
     emitted->emitted_ns = StepTimer::now_ns(CLOCK_MONOTONIC);
-    publish_counters();
     emitted_.store(emitted_frames() + 1);
     out_.push(emitted);
 }
@@ -99,16 +91,6 @@ void Ingest::charge_clocks() {
     const std::int64_t cpu_ns = std::exchange(cpu_start_ns_, StepTimer::now_ns(CLOCK_THREAD_CPUTIME_ID));
     times_.wall_ms[step] += static_cast<float>(1e-6 * static_cast<double>(wall_start_ns_ - wall_ns));
     times_.cpu_ms[step] += static_cast<float>(1e-6 * static_cast<double>(cpu_start_ns_ - cpu_ns));
-}
-
-void Ingest::publish_counters() {
-    std::size_t i = 0;
-    builder_.counters().visit([&](const char*, std::uint64_t value) { counters_[i++].set(value); });
-}
-
-void Ingest::visit_counters(const driver::CounterVisitor& visit) const {
-    std::size_t i = 0;
-    driver::FrameBuilderCounters{}.visit([&](const char* name, std::uint64_t) { visit(name, counters_[i++].value()); });
 }
 
 void Ingest::log_warnings() {

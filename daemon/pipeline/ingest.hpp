@@ -10,7 +10,6 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
-#include <vector>
 
 namespace dlod::daemon {
 
@@ -40,8 +39,10 @@ class Ingest final : public Actor {
 
     bool ended() const { return ended_.load(); }
     std::uint64_t emitted_frames() const { return emitted_.load(); }
-    /// The frame builder's counters as of the last frame or pause; from any thread.
-    void visit_counters(const driver::CounterVisitor& visit) const;
+    /// The frame builder's; from any thread.
+    const driver::FrameBuilderCounters& counters() const { return builder_.counters(); }
+    /// Counts the source's answers, also those without packets: it stands still where the source hangs. From any thread.
+    std::uint64_t steps() const { return steps_.value(); }
     /// CLOCK_MONOTONIC of the last packet; 0: none yet. From any thread.
     std::int64_t last_packet_ns() const { return last_packet_ns_.load(std::memory_order_relaxed); }
 
@@ -56,7 +57,6 @@ class Ingest final : public Actor {
     void emit(Frame* frame);
     void start_clocks();
     void charge_clocks();
-    void publish_counters();
     void log_warnings();
 
     driver::PacketSource& source_;
@@ -71,8 +71,8 @@ class Ingest final : public Actor {
     StageTimes times_;
     std::int64_t wall_start_ns_ = 0;
     std::int64_t cpu_start_ns_ = 0;
-    std::vector<driver::Counter> counters_;
     std::atomic<std::uint64_t> emitted_{0};
+    driver::Counter steps_;
     std::atomic<std::int64_t> last_packet_ns_{0};
     std::atomic<bool> ended_{false};
     std::atomic<bool> abandoned_{false};

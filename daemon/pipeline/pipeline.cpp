@@ -78,6 +78,17 @@ bool Pipeline::done() const {
            (ingest_.ended() && write_.completed() + prepare_.dropped_frames() == ingest_.emitted_frames());
 }
 
+bool Pipeline::moves_on() {
+    const std::array<const Stage*, 6> stages = {&prepare_, &odometry_, &detection_, &publish_, &map_, &write_};
+    bool moving = ingest_.ended() || std::exchange(ingest_steps_, ingest_.steps()) != ingest_.steps();
+    for (std::size_t i = 0; i < stages.size(); ++i) {
+        const Progress now{stages[i]->completed(), stages[i]->has_work()};
+        const Progress before = std::exchange(progress_[i], now);
+        if (before.had_work && now.completed == before.completed) moving = false;
+    }
+    return moving;
+}
+
 void Pipeline::rethrow_failure() const {
     if (workers_ && workers_->failed()) std::rethrow_exception(workers_->failure());
 }

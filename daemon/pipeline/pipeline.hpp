@@ -51,6 +51,9 @@ class Pipeline {
     /// Becomes readable once the pipeline is done or has failed.
     int done_descriptor() const { return done_descriptor_; }
     bool done() const;
+    /// False where a stage has had a frame to work on since the call before and has not finished any, or the source has
+    /// not come back. For one thread, called once a second or less often.
+    bool moves_on();
     /// Throws what a sink has thrown, if so.
     void rethrow_failure() const;
 
@@ -93,6 +96,14 @@ class Pipeline {
     Stage map_;
     Stage write_;
     Ingest ingest_;
+
+    /// What moves_on() saw of each stage and of the ingest.
+    struct Progress {
+        std::uint64_t completed = 0;
+        bool had_work = false;
+    };
+    std::array<Progress, 6> progress_{};
+    std::uint64_t ingest_steps_ = 0;
 
     std::unique_ptr<WorkerPool> workers_;
     std::thread receiver_;

@@ -28,14 +28,18 @@ class Stage : public Actor {
         return in_.read_available() > 0 && out_.write_available() > 0 && (!may_start_ || may_start_());
     }
     void run() override {
+        working_.store(true);
         PipelineFrame* frame = take();
         work_(*frame);
         // Counted before it is handed on: who sees the frame behind this stage sees the count, too.
         completed_.store(completed() + 1);
         out_.push(frame);
+        working_.store(false);
     }
     /// Frames worked on so far; what the stage did for them is visible to who reads it.
     std::uint64_t completed() const { return completed_.load(); }
+    /// A frame waits for it or is at work.
+    bool has_work() const { return working_.load() || in_.read_available() > 0; }
 
   protected:
     /// The next frame to work on; `in` has one.
@@ -52,6 +56,7 @@ class Stage : public Actor {
     Work work_;
     Condition may_start_;
     std::atomic<std::uint64_t> completed_{0};
+    std::atomic<bool> working_{false};
 };
 
 /// The first stage. Live, the newest frames win: where more are waiting than may, the oldest are dropped and counted.

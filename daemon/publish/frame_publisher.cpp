@@ -1,0 +1,146 @@
+#include "daemon/publish/frame_publisher.hpp"
+
+#include <algorithm>
+
+#include "daemon/publish/bit_plane.hpp"
+
+namespace dlod::daemon {
+namespace {
+
+/// LCM counts the channel's name and its end against the datagram.
+std::size_t room_for(const std::string& channel) { return kLargestDatagram - channel.size() - 1; }
+
+template <class Message>
+std::size_t encoded_size(const Message& message) {
+    return static_cast<std::size_t>(message.getEncodedSize());
+}
+
+int rows_that_fit(const SensorModel& sensor, std::size_t room) {
+    const std::size_t plane_bytes = (room - encoded_size(dynamic_mask_t{})) / 2;
+    const auto rows = static_cast<int>(8 * plane_bytes / static_cast<std::size_t>(sensor.width));
+    return std::min(rows, sensor.height);
+}
+
+std::size_t tracks_that_fit(std::size_t room) {
+    const tracks_t none{};
+    tracks_t one{};
+    one.count = 1;
+    one.tracks.resize(1);
+    return (room - encoded_size(none)) / (encoded_size(one) - encoded_size(none));
+}
+
+std::int32_t flags_of(const OdometryResult& odometry) {
+    static_assert(pose_t::IMU_USED == 2 * OdometryResult::kImuUsed && pose_t::IMU_FAULTY == 2 * OdometryResult::kImuFaulty);
+    // The message's flags are the odometry's, moved up by one bit for VALID.
+    return static_cast<std::int32_t>(odometry.flags << 1U) | (odometry.valid ? pose_t::VALID : 0);
+}
+
+void fill(const Track& track, track_t& message) {
+    message.id = track.id;
+    message.state = static_cast<std::int8_t>(track.state);
+    message.yaw = track.box.yaw_rad;
+    Eigen::Vector3d::Map(message.position) = track.box.center_m;
+    Eigen::Vector3d::Map(message.size) = track.box.size_m;
+    Eigen::Vector3d::Map(message.velocity) = track.velocity_mps;
+    // Symmetric: row-major and column-major are the same.
+    Eigen::Matrix<float, 6, 6>::Map(message.covariance) = track.covariance.cast<float>();
+    message.points = track.points;
+    message.hits = track.hits;
+    message.misses = track.misses;
+    message.age = track.age;
+    message.residual = static_cast<float>(track.residual_m);
+}
+
+}  // namespace
+
+BaseMotion base_motion(const OdometryResult& odometry, const Eigen::Isometry3d& T_base_sensor) {
+    BaseMotion motion;
+    motion.T_odom_base = odometry.T_world_sensor * T_base_sensor.inverse();
+    const Eigen::Vector3d lever = T_base_sensor.translation();
+    motion.angular_velocity_radps = T_base_sensor.linear() * odometry.angular_velocity_radps;
+    motion.linear_velocity_mps =
+        T_base_sensor.linear() * odometry.linear_velocity_mps - motion.angular_velocity_radps.cross(lever);
+    // p_base = p_sensor - d with d = R_odom_base * lever: a small rotation r moves it by d x r.
+    Matrix6d J = Matrix6d::Identity();
+    J.topRightCorner<3, 3>() = skew(motion.T_odom_base.linear() * lever);
+    motion.covariance = J * odometry.covariance * J.transpose();
+    return motion;
+}
+
+FramePublisher::FramePublisher(MessageBus& bus, const SensorModel& sensor, const Eigen::Isometry3d& T_base_sensor,
+                               const std::string& channel_prefix)
+    : sender_(bus),
+      T_base_sensor_(T_base_sensor),
+      pose_channel_(channel_prefix + "POSE"),
+      mask_channel_(channel_prefix + "MASK"),
+      tracks_channel_(channel_prefix + "TRACKS"),
+      rows_per_part_(rows_that_fit(sensor, room_for(mask_channel_))),
+      max_tracks_(tracks_that_fit(room_for(tracks_channel_))) {
+    const auto plane_bytes = (static_cast<std::size_t>(rows_per_part_ * sensor.width) + 7) / 8;
+    mask_.dynamic.reserve(plane_bytes);
+    mask_.undecided.reserve(plane_bytes);
+    tracks_.tracks.reserve(max_tracks_);
+}
+
+void FramePublisher::publish(const Frame& frame, std::int64_t utime) {
+    publish_pose(frame, utime);
+    publish_mask(frame, utime);
+    publish_tracks(frame, utime);
+}
+
+void FramePublisher::publish_pose(const Frame& frame, std::int64_t utime) {
+    const BaseMotion motion = base_motion(frame.odometry, T_base_sensor_);
+    const Eigen::Quaterniond q(motion.T_odom_base.linear());
+    pose_.utime = utime;
+    pose_.sequence = static_cast<std::int64_t>(frame.header.sequence);
+    Eigen::Vector3d::Map(pose_.position) = motion.T_odom_base.translation();
+    Eigen::Vector4d::Map(pose_.orientation) = Eigen::Vector4d(q.w(), q.x(), q.y(), q.z());
+    Eigen::Vector3d::Map(pose_.linear_velocity) = motion.linear_velocity_mps;
+    Eigen::Vector3d::Map(pose_.angular_velocity) = motion.angular_velocity_radps;
+    Matrix6d::Map(pose_.covariance) = motion.covariance;
+    pose_.flags = flags_of(frame.odometry);
+    sender_.send(pose_channel_, pose_);
+}
+
+void FramePublisher::publish_mask(const Frame& frame, std::int64_t utime) {
+    const auto& label = frame.detection.label;
+    mask_.utime = utime;
+    mask_.sequence = static_cast<std::int64_t>(frame.header.sequence);
+    mask_.height = label.height();
+    mask_.width = label.width();
+    mask_.parts = static_cast<std::int16_t>((label.height() + rows_per_part_ - 1) / rows_per_part_);
+    for (std::int16_t part = 0; part < mask_.parts; ++part) {
+        mask_.part = part;
+        mask_.first_row = part * rows_per_part_;
+        mask_.rows = std::min(rows_per_part_, label.height() - mask_.first_row);
+        const std::span labels(label.row(mask_.first_row), static_cast<std::size_t>(mask_.rows * label.width()));
+        const std::size_t bytes = (labels.size() + 7) / 8;
+        mask_.bytes = static_cast<std::int32_t>(bytes);
+        mask_.dynamic.resize(bytes);
+        mask_.undecided.resize(bytes);
+        pack_bit_plane(labels, static_cast<std::uint8_t>(PixelLabel::kDynamic), mask_.dynamic);
+        pack_bit_plane(labels, static_cast<std::uint8_t>(PixelLabel::kUndecided), mask_.undecided);
+        sender_.send(mask_channel_, mask_);
+    }
+}
+
+void FramePublisher::publish_tracks(const Frame& frame, std::int64_t utime) {
+    const Eigen::Vector3d robot = frame.odometry.T_world_sensor.translation();
+    by_distance_.clear();
+    for (const Track& track : frame.detection.tracks) {
+        by_distance_.emplace_back((track.box.center_m - robot).squaredNorm(), &track);
+    }
+    std::sort(by_distance_.begin(), by_distance_.end(), [](const auto& a, const auto& b) {
+        return a.first != b.first ? a.first < b.first : a.second->id < b.second->id;
+    });
+    const std::size_t count = std::min(by_distance_.size(), max_tracks_);
+    tracks_.utime = utime;
+    tracks_.sequence = static_cast<std::int64_t>(frame.header.sequence);
+    tracks_.left_out = static_cast<std::int32_t>(by_distance_.size() - count);
+    tracks_.count = static_cast<std::int32_t>(count);
+    tracks_.tracks.resize(count);
+    for (std::size_t i = 0; i < count; ++i) fill(*by_distance_[i].second, tracks_.tracks[i]);
+    sender_.send(tracks_channel_, tracks_);
+}
+
+}  // namespace dlod::daemon

@@ -1,0 +1,35 @@
+#pragma once
+
+#include "daemon/publish/message_bus.hpp"
+
+#include <stdexcept>
+#include <string>
+
+struct _lcm_t;
+
+namespace dlod::daemon {
+
+/// LCM cannot be used as configured; the message says what to do.
+class MessageBusError : public std::runtime_error {
+  public:
+    using std::runtime_error::runtime_error;
+};
+
+/// LCM, for publishing only: its receiving side tests itself for up to ten seconds where multicast does not work, and is
+/// made only for who subscribes.
+class LcmBus final : public MessageBus {
+  public:
+    /// @param url LCM provider, "udpm://239.255.76.67:7667?ttl=1"; empty: LCM's default
+    /// @throws MessageBusError at once where the URL is wrong or no route leads to its group
+    explicit LcmBus(const std::string& url);
+    ~LcmBus() override;
+    LcmBus(const LcmBus&) = delete;
+    LcmBus& operator=(const LcmBus&) = delete;
+
+    bool publish(const std::string& channel, std::span<const std::byte> message) override;
+
+  private:
+    _lcm_t* lcm_;
+};
+
+}  // namespace dlod::daemon

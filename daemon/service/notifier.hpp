@@ -1,0 +1,19 @@
+// What systemd is told about the service (sd_notify); nothing happens where systemd did not start it.
+#pragma once
+
+#include <string>
+
+namespace dlod::daemon {
+
+class ServiceNotifier {
+  public:
+    void ready(const std::string& status) const;
+    void status(const std::string& status) const;
+    /// "Still alive". Call it only while the work moves on.
+    void watchdog() const;
+    /// A reload has begun; ready() ends it.
+    void reloading() const;
+    void stopping() const;
+};
+
+}  // namespace dlod::daemon
