@@ -29,7 +29,7 @@ constexpr std::size_t kUdpHeader = 8;
 constexpr std::size_t kLargestPayload = 65535 - kIpv4Header - kUdpHeader;
 constexpr std::uint8_t kTimeToLive = 64;
 constexpr std::uint8_t kIpv6Fragment = 44;
-constexpr int kSmallestMtu = 128;
+constexpr int kSmallestMtu = 256;
 constexpr int kLargestMtu = 65535;
 
 /// Appends big-endian (network) and host-order values to memory that was reserved before.
@@ -117,8 +117,8 @@ bool PcapWriter::flush() noexcept {
         if (n < 0 && errno == EINTR) continue;
         if (n <= 0) {
             const int error_number = n < 0 ? errno : EIO;
-            // Back to the last flush, which ended with a whole record.
-            if (::ftruncate(file_, static_cast<off_t>(flushed_)) != 0) return fail("has a torn end", errno);
+            // Back to the last flush, which ended with a whole record. What is no file has nothing to cut.
+            [[maybe_unused]] const int cut = ::ftruncate(file_, static_cast<off_t>(flushed_));
             return fail("cannot be written", error_number);
         }
         done += static_cast<std::size_t>(n);
@@ -130,7 +130,7 @@ bool PcapWriter::flush() noexcept {
 
 bool PcapWriter::write(const Packet& packet) noexcept {
     if (!ok()) return false;
-    if (packet.data.size() > kLargestPayload) return fail("cannot hold a datagram of this size", EMSGSIZE);
+    if (packet.data.size() > kLargestPayload) return false;
 
     Datagram d;
     d.ipv4 = is_ipv4(packet.sender_address) || is_unspecified(packet.sender_address);

@@ -12,7 +12,7 @@
 namespace dlod::driver {
 
 struct PcapWriterOptions {
-    int mtu = 65535;  ///< bytes of an IP packet, 128 to 65535; datagrams that do not fit are written as fragments
+    int mtu = 65535;  ///< bytes of an IP packet, 256 to 65535; datagrams that do not fit are written as fragments
     IpAddress destination_ipv4 = ipv4_address(127, 0, 0, 1);  ///< packets do not carry their destination
     IpAddress destination_ipv6 = ipv6_loopback();
 };
@@ -28,7 +28,8 @@ class PcapWriter {
     PcapWriter(const PcapWriter&) = delete;
     PcapWriter& operator=(const PcapWriter&) = delete;
 
-    /// Appends a datagram with the time stamp `receive_ns`; it may stay in memory until flush().
+    /// Appends a datagram with the time stamp `receive_ns`; it may stay in memory until flush(). One that no UDP
+    /// datagram can be (over 65507 bytes) is refused, without harm to the next.
     bool write(const Packet& packet) noexcept;
 
     /// Hands everything to the operating system.

@@ -1,13 +1,12 @@
 // What detection and tracking tell the odometry, a fixed number of frames later.
 #pragma once
 
-#include "core/types/image.hpp"
-#include "core/types/oriented_box.hpp"
-
 #include <Eigen/Geometry>
-
 #include <cstdint>
 #include <vector>
+
+#include "core/types/image.hpp"
+#include "core/types/oriented_box.hpp"
 
 namespace dlod {
 
@@ -17,7 +16,7 @@ inline constexpr int kFeedbackDelay = 2;
 
 /// Predicted footprint of a moving object.
 struct MovingBox {
-    OrientedBox box;                 ///< world frame, at the stamp of the frame that the feedback is of
+    OrientedBox box;  ///< world frame, at the stamp of the frame that the feedback is of
     Eigen::Vector3d velocity_mps = Eigen::Vector3d::Zero();
 };
 
@@ -25,16 +24,28 @@ struct MovingBox {
 struct KeyframeCloud {
     Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
     AlignedVector<float> x, y, z;     ///< sensor frame at the stamp, deskewed, metres
-    AlignedVector<float> nx, ny, nz;  ///< unit normals, same frame
+    AlignedVector<float> nx, ny, nz;  ///< unit normals, same frame; 0, 0, 0 where the surface is not flat
+
+    void clear() {
+        for (auto* values : {&x, &y, &z, &nx, &ny, &nz}) values->clear();
+    }
+    void push(const float point[3], const float normal[3]) {
+        x.push_back(point[0]);
+        y.push_back(point[1]);
+        z.push_back(point[2]);
+        nx.push_back(normal[0]);
+        ny.push_back(normal[1]);
+        nz.push_back(normal[2]);
+    }
 };
 
 struct OdometryFeedback {
-    std::uint64_t sequence = 0;       ///< of the frame that it comes from
+    std::uint64_t sequence = 0;  ///< of the frame that it comes from
     std::int64_t stamp_ns = 0;
-    std::vector<MovingBox> moving;    ///< points inside weigh nothing in the registration
+    std::vector<MovingBox> moving;  ///< points inside weigh nothing in the registration
     bool has_keyframe = false;
     KeyframeCloud keyframe;
-    std::vector<OrientedBox> cleared; ///< boxes whose points leave the odometry's own keyframes
+    std::vector<OrientedBox> cleared;  ///< boxes whose points leave the odometry's own keyframes
 };
 
 }  // namespace dlod

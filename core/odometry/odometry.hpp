@@ -1,20 +1,34 @@
 // Two-stage odometry (paper, Sec. "Overview", Eq. 4): scan to scan, then scan to submap with the first as prior.
 #pragma once
 
+#include <memory>
+
+#include "core/map/keyframe_database.hpp"
 #include "core/odometry/feedback.hpp"
+#include "core/odometry/motion_filter.hpp"
+#include "core/registration/scan_to_scan.hpp"
+#include "core/registration/scan_to_submap.hpp"
 #include "core/types/frame.hpp"
 #include "core/types/parameter.hpp"
-
-#include <memory>
 
 namespace dlod {
 
 struct OdometryConfig {
     bool use_imu = true;
+    ScanToScanConfig scan_to_scan;
+    ScanToSubmapConfig scan_to_submap;
+    MotionFilterConfig motion;
+    VoxelMapConfig voxels;
+    KeyframeConfig keyframes;
 
     template <class V>
     void visit(V& v) {
         v.flag("use_imu", use_imu, "use the sensor's IMU for rotation, gravity and motion within the sweep");
+        v.group("scan_to_scan", scan_to_scan, "first stage of the registration");
+        v.group("scan_to_submap", scan_to_submap, "second stage of the registration");
+        v.group("motion", motion, "motion model and its noise");
+        v.group("voxels", voxels, "voxels of the local map");
+        v.group("keyframes", keyframes, "choice of keyframes and submap");
     }
 };
 

@@ -1,7 +1,131 @@
 #include "core/preprocess/subsampling.hpp"
 
-namespace dlod {
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
 
-void Subsampling::process(Frame& frame) { frame.prepared.points.clear(); }
+namespace dlod {
+namespace {
+
+/// Face of a cube that the direction points through, in quarters.
+std::uint8_t direction_bin(const Eigen::Vector3f& n) {
+    Eigen::Index axis;
+    n.cwiseAbs().maxCoeff(&axis);
+    const int sign = n[axis] > 0.0F ? 1 : 0;
+    const int u = n[(axis + 1) % 3] > 0.0F ? 1 : 0;
+    const int v = n[(axis + 2) % 3] > 0.0F ? 1 : 0;
+    return static_cast<std::uint8_t>(((static_cast<int>(axis) * 2 + sign) * 2 + u) * 2 + v);
+}
+
+/// The largest share per bin at which all bins together stay within the budget; bins with less keep all they have.
+template <std::size_t N>
+int fair_share(const std::array<int, N>& counts, int budget) {
+    std::array<int, N> sorted = counts;
+    std::sort(sorted.begin(), sorted.end());
+    int left = budget;
+    for (std::size_t i = 0; i < N; ++i) {
+        const int share = left / static_cast<int>(N - i);
+        if (sorted[i] > share) return std::max(1, share);
+        left -= sorted[i];
+    }
+    return budget;
+}
+
+}  // namespace
+
+Subsampling::Subsampling(const SensorModel& sensor, const SubsamplingConfig& config)
+    : sensor_(sensor), config_(config), windows_(sensor) {
+    const int rows = std::clamp(config.rows, 1, sensor.height);
+    for (int i = 0; i < rows; ++i) candidate_rows_.push_back((2 * i + 1) * sensor.height / (2 * rows));
+    const auto per_row = static_cast<std::size_t>(sensor.width / config.column_step + 1);
+    flat_.reserve(static_cast<std::size_t>(rows) * per_row);
+    rough_.reserve(static_cast<std::size_t>(rows) *
+                   static_cast<std::size_t>(sensor.width / config.rough_column_step + 1));
+}
+
+void Subsampling::process(Frame& frame) {
+    flat_.clear();
+    rough_.clear();
+    windows_.load(frame);
+    for (const int row : candidate_rows_) collect_row(frame, row);
+    select(frame);
+}
+
+void Subsampling::collect_row(const Frame& frame, int row) {
+    windows_.fit_row(row, planes_);
+    const int w = sensor_.width;
+    const auto min_range = static_cast<float>(std::max(config_.min_range_m, 1e-3));
+    const auto crop = static_cast<float>(config_.crop_box_m);
+    const auto max_deviation = static_cast<float>(config_.max_deviation_m);
+    const auto min_incidence = static_cast<float>(config_.min_incidence);
+    // Columns per spacing at one metre of range.
+    const auto columns_at_1m = static_cast<float>(config_.spacing_m * w / (2.0 * std::numbers::pi));
+    const float* range = frame.cloud.range_m.row(row);
+    const float* x = frame.cloud.x.row(row);
+    const float* y = frame.cloud.y.row(row);
+    const float* z = frame.cloud.z.row(row);
+    const int first = row * w;
+    for (int c = 0; c < w; c += config_.column_step) {
+        if (range[c] < min_range) continue;
+        if (std::max({std::abs(x[c]), std::abs(y[c]), std::abs(z[c])}) < crop) continue;
+        const auto i = static_cast<std::size_t>(c);
+        const float inverse = planes_.inverse_range[i];
+        if (inverse > 0.0F && planes_.deviation_m[i] <= max_deviation) {
+            // Power of two, so that the thinned grid of neighbouring ranges shares its columns.
+            int step = config_.column_step;
+            while (static_cast<float>(2 * step) <= columns_at_1m * inverse) step *= 2;
+            if (c % step != 0) continue;
+            const float b = planes_.slope_azimuth[i];
+            const float g = planes_.slope_altitude[i];
+            const float length = std::sqrt(inverse * inverse + b * b + g * g);
+            if (inverse >= min_incidence * length) {
+                const BeamFrame beam = windows_.beam(row, c);
+                const Eigen::Vector3f normal = -(inverse * beam.direction + b * beam.along_row + g * beam.up) / length;
+                const float ratio = planes_.deviation_m[i] / max_deviation;
+                flat_.push_back({static_cast<PixelIndex>(first + c), direction_bin(normal),
+                                 1.0F / inverse - 1.0F / windows_.inverse_range(row, c), 1.0F - 0.9F * ratio * ratio,
+                                 normal.x(), normal.y(), normal.z()});
+                continue;
+            }
+        }
+        if (c % config_.rough_column_step == 0) rough_.push_back(static_cast<PixelIndex>(first + c));
+    }
+}
+
+void Subsampling::select(Frame& frame) {
+    PointSelection& points = frame.prepared.points;
+    points.clear();
+    const auto append = [&](PixelIndex pixel, const Eigen::Vector3f& normal, float planarity, float smoothing_m) {
+        const int row = static_cast<int>(pixel) / sensor_.width;
+        const int column = static_cast<int>(pixel) % sensor_.width;
+        const auto m = static_cast<std::size_t>(sensor_.measurement_of(row, column));
+        Eigen::Vector3f p(frame.cloud.x[pixel], frame.cloud.y[pixel], frame.cloud.z[pixel]);
+        if (smoothing_m != 0.0F) p += smoothing_m * windows_.beam(row, column).direction;
+        points.pixel.push_back(pixel);
+        points.measurement.push_back(static_cast<std::uint16_t>(m));
+        points.x.push_back(p.x());
+        points.y.push_back(p.y());
+        points.z.push_back(p.z());
+        points.nx.push_back(normal.x());
+        points.ny.push_back(normal.y());
+        points.nz.push_back(normal.z());
+        points.planarity.push_back(planarity);
+        points.time_s.push_back(static_cast<float>(frame.columns.time_ns[m] - frame.header.stamp_ns) * 1e-9F);
+    };
+    std::array<int, kDirections> count{};
+    for (const Candidate& candidate : flat_) ++count[candidate.direction];
+    const int share = fair_share(count, config_.points);
+    // Every count/share-th of a bin, spread evenly over the image.
+    std::array<int, kDirections> credit{};
+    for (const Candidate& candidate : flat_) {
+        int& c = credit[candidate.direction];
+        c += std::min(share, count[candidate.direction]);
+        if (c < count[candidate.direction]) continue;
+        c -= count[candidate.direction];
+        append(candidate.pixel, {candidate.nx, candidate.ny, candidate.nz}, candidate.planarity, candidate.smoothing_m);
+    }
+    for (const PixelIndex pixel : rough_) append(pixel, Eigen::Vector3f::Zero(), 0.0F, 0.0F);
+}
 
 }  // namespace dlod

@@ -2,33 +2,73 @@
 // subsampling, crop box and minimum range).
 #pragma once
 
+#include "core/preprocess/plane_windows.hpp"
 #include "core/types/frame.hpp"
 #include "core/types/parameter.hpp"
 
 namespace dlod {
 
 struct SubsamplingConfig {
-    int row_step = 2;
-    int column_step = 5;
+    int rows = 32;
+    int column_step = 2;
+    int rough_column_step = 4;
+    int points = 4000;
+    double spacing_m = 0.12;
     double min_range_m = 0.5;
+    double crop_box_m = 0.5;
+    double max_deviation_m = 0.03;
+    double min_incidence = 0.08;
 
     template <class V>
     void visit(V& v) {
-        v.parameter("row_step", row_step, Range{1, 16}, "rows", "every n-th row is a candidate; higher is faster, less accurate");
+        v.parameter("rows", rows, Range{4, 512}, "rows",
+                    "rows of the image that are candidates; more is slower, more accurate");
         v.parameter("column_step", column_step, Range{1, 64}, "columns", "every n-th column is a candidate");
-        v.parameter("min_range_m", min_range_m, Range{0.0, 10.0}, "m", "nearer returns (the robot itself) are not used");
+        v.parameter("rough_column_step", rough_column_step, Range{1, 64}, "columns",
+                    "every n-th column of what is not flat; lower sees smaller moving objects");
+        v.parameter("points", points, Range{200, 50000}, "points",
+                    "flat points kept, evened out over the directions of their normals");
+        v.parameter("spacing_m", spacing_m, Range{0.0, 5.0}, "m",
+                    "near surfaces are thinned to about this spacing along a row");
+        v.parameter("min_range_m", min_range_m, Range{0.0, 10.0}, "m",
+                    "nearer returns (the robot itself) are not used");
+        v.parameter("crop_box_m", crop_box_m, Range{0.0, 10.0}, "m",
+                    "half side of a cube around the sensor whose points are not used");
+        v.parameter("max_deviation_m", max_deviation_m, Range{0.001, 0.5}, "m",
+                    "a window counts as flat up to this deviation from its plane");
+        v.parameter("min_incidence", min_incidence, Range{0.0, 1.0}, "",
+                    "least cosine between beam and normal of a flat point");
     }
 };
 
-/// Selects the points of the registration: fills frame.prepared.points from frame.cloud. Needs no pose.
+/// Selects the points of the registration: fills frame.prepared.points from the range image. Needs no pose.
+/// Flat points are smoothed over their window and carry its normal; the others are raw, with planarity 0.
 class Subsampling {
   public:
-    Subsampling(const SensorModel& sensor, const SubsamplingConfig& config) : sensor_(sensor), config_(config) {}
+    Subsampling(const SensorModel& sensor, const SubsamplingConfig& config);
     void process(Frame& frame);
 
   private:
+    static constexpr int kDirections = 24;  ///< bins of normals: 2 x 2 on each face of a cube
+
+    struct Candidate {
+        PixelIndex pixel;
+        std::uint8_t direction;
+        float smoothing_m;  ///< to be added along the beam
+        float planarity;
+        float nx, ny, nz;
+    };
+
+    void collect_row(const Frame& frame, int row);
+    void select(Frame& frame);
+
     SensorModel sensor_;
     SubsamplingConfig config_;
+    PlaneWindows windows_;
+    PlaneRow planes_;
+    std::vector<Candidate> flat_;
+    std::vector<PixelIndex> rough_;
+    std::vector<int> candidate_rows_;
 };
 
 }  // namespace dlod

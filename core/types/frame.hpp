@@ -53,6 +53,7 @@ struct StructuredCloud {
 /// Points taken out of the image, with their pixels (structure of arrays).
 struct PointSelection {
     AlignedVector<PixelIndex> pixel;
+    AlignedVector<std::uint16_t> measurement;  ///< column in which it was fired
     AlignedVector<float> x, y, z;     ///< sensor frame at firing time, metres
     AlignedVector<float> nx, ny, nz;  ///< unit normal towards the sensor, from the range-image window
     AlignedVector<float> planarity;   ///< 0 (scattered) .. 1 (flat): trust in the normal
@@ -60,6 +61,7 @@ struct PointSelection {
     std::size_t size() const { return pixel.size(); }
     void clear() {
         pixel.clear();
+        measurement.clear();
         for (auto* v : {&x, &y, &z, &nx, &ny, &nz, &planarity, &time_s}) v->clear();
     }
 };

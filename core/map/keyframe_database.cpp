@@ -1,0 +1,141 @@
+#include "core/map/keyframe_database.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace dlod {
+namespace {
+
+double angle_between(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
+    return 2.0 * std::acos(std::min(1.0, std::abs(a.dot(b))));
+}
+
+std::int16_t to_normal_units(double v) {
+    return static_cast<std::int16_t>(std::lround(std::clamp(v, -1.0, 1.0) * kNormalUnits));
+}
+
+}  // namespace
+
+KeyframeDatabase::KeyframeDatabase(const KeyframeConfig& config, const VoxelMapConfig& voxels)
+    : config_(config), submap_(voxels) {
+    const auto most = static_cast<std::size_t>(config.max_keyframes) + 1;
+    keyframes_.reserve(most);
+    announced_.reserve(16);
+    chosen_.reserve(most);
+    order_.reserve(most);
+}
+
+bool KeyframeDatabase::is_due(const Eigen::Isometry3d& T, double spaciousness_m) const {
+    const double distance =
+        std::clamp(config_.distance_share * spaciousness_m, config_.min_distance_m, config_.max_distance_m);
+    const double angle = config_.angle_deg * std::numbers::pi / 180.0;
+    const Eigen::Quaterniond rotation(T.rotation());
+    const auto covers = [&](const Eigen::Vector3d& position, const Eigen::Quaterniond& other) {
+        return (position - T.translation()).norm() < distance && angle_between(rotation, other) < angle;
+    };
+    for (const Keyframe& k : keyframes_) {
+        if (covers(k.position_m, k.rotation)) return false;
+    }
+    for (const Eigen::Isometry3d& pose : announced_) {
+        if (covers(pose.translation(), Eigen::Quaterniond(pose.rotation()))) return false;
+    }
+    return true;
+}
+
+void KeyframeDatabase::announce(const Eigen::Isometry3d& T_world_sensor) {
+    announced_.push_back(T_world_sensor);
+}
+
+void KeyframeDatabase::convert(const KeyframeCloud& cloud, std::vector<FixedPoint>& points) {
+    const Eigen::Matrix3d R = cloud.T_world_sensor.rotation();
+    points.clear();
+    points.reserve(cloud.x.size());
+    for (std::size_t i = 0; i < cloud.x.size(); ++i) {
+        const Eigen::Vector3d p =
+            cloud.T_world_sensor * Eigen::Vector3d(cloud.x[i], cloud.y[i], cloud.z[i]) / kMapUnit_m;
+        const Eigen::Vector3d n = R * Eigen::Vector3d(cloud.nx[i], cloud.ny[i], cloud.nz[i]);
+        if (!(p.cwiseAbs().maxCoeff() < 2e9)) continue;
+        points.push_back({static_cast<std::int32_t>(std::lround(p.x())), static_cast<std::int32_t>(std::lround(p.y())),
+                          static_cast<std::int32_t>(std::lround(p.z())), to_normal_units(n.x()), to_normal_units(n.y()),
+                          to_normal_units(n.z())});
+    }
+}
+
+void KeyframeDatabase::add(const KeyframeCloud& cloud) {
+    submap_.remove(provisional_);
+    provisional_.clear();
+    std::erase_if(announced_, [&](const Eigen::Isometry3d& pose) { return pose.isApprox(cloud.T_world_sensor); });
+    if (keyframes_.size() >= static_cast<std::size_t>(config_.max_keyframes)) {
+        forget_farthest(cloud.T_world_sensor.translation());
+    }
+    Keyframe& keyframe = keyframes_.emplace_back();
+    keyframe.position_m = cloud.T_world_sensor.translation();
+    keyframe.rotation = Eigen::Quaterniond(cloud.T_world_sensor.rotation());
+    convert(cloud, keyframe.points);
+    keyframe.low_m.setConstant(1e12);
+    keyframe.high_m.setConstant(-1e12);
+    for (const FixedPoint& p : keyframe.points) {
+        const Eigen::Vector3d q = Eigen::Vector3d(p.x, p.y, p.z) * kMapUnit_m;
+        keyframe.low_m = keyframe.low_m.cwiseMin(q);
+        keyframe.high_m = keyframe.high_m.cwiseMax(q);
+    }
+}
+
+void KeyframeDatabase::set_provisional(const KeyframeCloud& cloud) {
+    submap_.remove(provisional_);
+    convert(cloud, provisional_);
+    submap_.add(provisional_);
+}
+
+void KeyframeDatabase::clear() {
+    keyframes_.clear();
+    announced_.clear();
+    provisional_.clear();
+    submap_.clear();
+}
+
+void KeyframeDatabase::forget_farthest(const Eigen::Vector3d& position_m) {
+    const auto farthest =
+        std::max_element(keyframes_.begin(), keyframes_.end(), [&](const Keyframe& a, const Keyframe& b) {
+            return (a.position_m - position_m).squaredNorm() < (b.position_m - position_m).squaredNorm();
+        });
+    if (farthest->in_submap) submap_.remove(farthest->points);
+    keyframes_.erase(farthest);
+}
+
+void KeyframeDatabase::remove_points(const OrientedBox& box) {
+    const double reach = 0.5 * box.size_m.norm();
+    for (Keyframe& keyframe : keyframes_) {
+        const Eigen::Vector3d outside = (keyframe.low_m - box.center_m).cwiseMax(box.center_m - keyframe.high_m);
+        if (outside.maxCoeff() > reach) continue;
+        const auto first = std::stable_partition(
+            keyframe.points.begin(), keyframe.points.end(),
+            [&](const FixedPoint& p) { return !box.contains(Eigen::Vector3d(p.x, p.y, p.z) * kMapUnit_m); });
+        if (keyframe.in_submap) submap_.remove({first, keyframe.points.end()});
+        keyframe.points.erase(first, keyframe.points.end());
+    }
+}
+
+void KeyframeDatabase::update_submap(const Eigen::Vector3d& position_m) {
+    order_.clear();
+    for (std::size_t i = 0; i < keyframes_.size(); ++i) {
+        order_.emplace_back((keyframes_[i].position_m - position_m).squaredNorm(), i);
+    }
+    std::sort(order_.begin(), order_.end());
+    chosen_.assign(keyframes_.size(), 0);
+    const auto nearest = std::min(order_.size(), static_cast<std::size_t>(config_.nearest));
+    for (std::size_t i = 0; i < nearest; ++i) chosen_[order_[i].second] = 1;
+    for (std::size_t i = 0; i < keyframes_.size(); ++i) {
+        Keyframe& keyframe = keyframes_[i];
+        if (keyframe.in_submap == (chosen_[i] != 0)) continue;
+        keyframe.in_submap = chosen_[i] != 0;
+        if (keyframe.in_submap) {
+            submap_.add(keyframe.points);
+        } else {
+            submap_.remove(keyframe.points);
+        }
+    }
+}
+
+}  // namespace dlod

@@ -1,0 +1,90 @@
+// Keyframes, and the choice of those that make up the submap (paper, Sec. "Overview"; Chen et al., DLO).
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/map/voxel_map.hpp"
+#include "core/odometry/feedback.hpp"
+#include "core/types/oriented_box.hpp"
+#include "core/types/parameter.hpp"
+
+namespace dlod {
+
+struct KeyframeConfig {
+    double distance_share = 0.1;
+    double min_distance_m = 0.3;
+    double max_distance_m = 5.0;
+    double angle_deg = 30.0;
+    int nearest = 20;
+    int convex_hull = 5;
+    int concave_hull = 5;
+    int max_keyframes = 300;
+
+    template <class V>
+    void visit(V& v) {
+        v.parameter("distance_share", distance_share, Range{0.01, 1.0}, "",
+                    "a keyframe every so many times the median range (spaciousness)");
+        v.parameter("min_distance_m", min_distance_m, Range{0.05, 50.0}, "m",
+                    "but never nearer to each other than this");
+        v.parameter("max_distance_m", max_distance_m, Range{0.1, 100.0}, "m", "and never farther than this");
+        v.parameter("angle_deg", angle_deg, Range{5.0, 180.0}, "deg", "or after a turn by this angle");
+        v.parameter("nearest", nearest, Range{1, 200}, "keyframes", "the nearest ones, in the submap");
+        v.parameter("convex_hull", convex_hull, Range{0, 200}, "keyframes",
+                    "nearest ones of the convex hull of all, in the submap");
+        v.parameter("concave_hull", concave_hull, Range{0, 200}, "keyframes",
+                    "nearest ones of the concave hull of all, in the submap");
+        v.parameter("max_keyframes", max_keyframes, Range{2, 10000}, "keyframes",
+                    "beyond this the farthest is forgotten");
+    }
+};
+
+/// Keyframes in world coordinates, fixed point. The submap is a voxel map of the chosen ones; what changes in the
+/// choice is added or taken away exactly.
+class KeyframeDatabase {
+  public:
+    KeyframeDatabase(const KeyframeConfig& config, const VoxelMapConfig& voxels);
+
+    /// True where a scan at this pose should become a keyframe.
+    /// @param spaciousness_m median range of the scan
+    bool is_due(const Eigen::Isometry3d& T_world_sensor, double spaciousness_m) const;
+    /// Remembers that a keyframe is on its way, so that its neighbours do not become one too.
+    void announce(const Eigen::Isometry3d& T_world_sensor);
+    void add(const KeyframeCloud& cloud);
+    /// A stand-in for the submap while there is no keyframe yet.
+    void set_provisional(const KeyframeCloud& cloud);
+    void clear();
+    /// Takes all points inside the box out of all keyframes.
+    void remove_points(const OrientedBox& box);
+
+    /// Chooses the submap for a sensor at this position.
+    void update_submap(const Eigen::Vector3d& position_m);
+    VoxelMap& submap() { return submap_; }
+
+    std::size_t size() const { return keyframes_.size(); }
+    bool empty() const { return keyframes_.empty() && provisional_.empty(); }
+
+  private:
+    struct Keyframe {
+        Eigen::Vector3d position_m;
+        Eigen::Quaterniond rotation;
+        std::vector<FixedPoint> points;
+        Eigen::Vector3d low_m, high_m;  ///< bounds of the points, world
+        bool in_submap = false;
+    };
+
+    static void convert(const KeyframeCloud& cloud, std::vector<FixedPoint>& points);
+    void forget_farthest(const Eigen::Vector3d& position_m);
+
+    KeyframeConfig config_;
+    VoxelMap submap_;
+    std::vector<Keyframe> keyframes_;
+    std::vector<Eigen::Isometry3d> announced_;
+    std::vector<FixedPoint> provisional_;
+    std::vector<std::uint8_t> chosen_;                   ///< scratch of update_submap
+    std::vector<std::pair<double, std::size_t>> order_;  ///< scratch of update_submap
+};
+
+}  // namespace dlod

@@ -1,0 +1,173 @@
+#include "core/map/voxel_map.hpp"
+
+#include <Eigen/Dense>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace dlod {
+namespace {
+
+constexpr std::size_t kInitialTable = std::size_t{1} << 16;
+
+std::int32_t floor_divide(std::int32_t a, std::int32_t b) {
+    const std::int32_t q = a / b;
+    return q * b > a ? q - 1 : q;
+}
+
+}  // namespace
+
+VoxelMap::VoxelMap(const VoxelMapConfig& config) : config_(config) {
+    // Even, so that the centre is a whole number too.
+    side_ = std::max<std::int32_t>(2, 2 * static_cast<std::int32_t>(std::lround(0.5 * config.voxel_m / kMapUnit_m)));
+    const double radius = config.surfel_radius_m / kMapUnit_m;
+    disc_ = std::llround(0.25 * radius * radius);
+    table_.resize(kInitialTable);
+    for (auto reserve : {kInitialTable / 2}) {
+        moments_.reserve(reserve);
+        planes_.reserve(reserve);
+        fitted_.reserve(reserve);
+        free_.reserve(reserve);
+    }
+}
+
+void VoxelMap::clear() {
+    std::fill(table_.begin(), table_.end(), Entry{});
+    moments_.clear();
+    planes_.clear();
+    fitted_.clear();
+    free_.clear();
+    voxel_count_ = 0;
+}
+
+VoxelIndex VoxelMap::index_of(const FixedPoint& p) const {
+    return {floor_divide(p.x, side_), floor_divide(p.y, side_), floor_divide(p.z, side_)};
+}
+
+std::uint64_t VoxelMap::key_of(VoxelIndex i) {
+    constexpr std::uint64_t kMask = (std::uint64_t{1} << 21) - 1;
+    return ((static_cast<std::uint64_t>(static_cast<std::uint32_t>(i.x)) & kMask) << 42) |
+           ((static_cast<std::uint64_t>(static_cast<std::uint32_t>(i.y)) & kMask) << 21) |
+           (static_cast<std::uint64_t>(static_cast<std::uint32_t>(i.z)) & kMask);
+}
+
+std::size_t VoxelMap::home_of(std::uint64_t key) const {
+    const int bits = std::countr_zero(table_.size());
+    return static_cast<std::size_t>((key * 0x9E3779B97F4A7C15ULL) >> (64 - bits));
+}
+
+std::size_t VoxelMap::locate(std::uint64_t key) const {
+    const std::size_t mask = table_.size() - 1;
+    std::size_t i = home_of(key);
+    while (table_[i].key != key && table_[i].key != kEmpty) i = (i + 1) & mask;
+    return i;
+}
+
+const VoxelPlane* VoxelMap::find(VoxelIndex index) {
+    const Entry& entry = table_[locate(key_of(index))];
+    if (entry.key == kEmpty) return nullptr;
+    if (!fitted_[entry.slot]) fit(entry.slot);
+    const VoxelPlane& plane = planes_[entry.slot];
+    return plane.points >= static_cast<std::uint32_t>(config_.min_points) ? &plane : nullptr;
+}
+
+void VoxelMap::accumulate(std::span<const FixedPoint> points, int sign) {
+    constexpr std::int64_t kOne = std::int64_t{kNormalUnits} * kNormalUnits;
+    for (const FixedPoint& p : points) {
+        const VoxelIndex index = index_of(p);
+        const std::uint64_t key = key_of(index);
+        std::size_t entry = locate(key);
+        if (table_[entry].key == kEmpty) {
+            if (2 * (voxel_count_ + 1) > table_.size()) {
+                grow();
+                entry = locate(key);
+            }
+            std::uint32_t slot;
+            if (free_.empty()) {
+                slot = static_cast<std::uint32_t>(moments_.size());
+                moments_.emplace_back();
+                planes_.emplace_back();
+                fitted_.push_back(0);
+            } else {
+                slot = free_.back();
+                free_.pop_back();
+                moments_[slot] = Moments{};
+            }
+            table_[entry] = {key, slot};
+            ++voxel_count_;
+        }
+        const std::uint32_t slot = table_[entry].slot;
+        Moments& m = moments_[slot];
+        const std::int64_t d[3] = {p.x - (std::int64_t{index.x} * side_ + side_ / 2),
+                                   p.y - (std::int64_t{index.y} * side_ + side_ / 2),
+                                   p.z - (std::int64_t{index.z} * side_ + side_ / 2)};
+        const std::int64_t n[3] = {p.nx, p.ny, p.nz};
+        const bool disc = p.nx != 0 || p.ny != 0 || p.nz != 0;
+        m.count += sign;
+        for (std::size_t i = 0, k = 0; i < 3; ++i) {
+            m.sum[i] += sign * static_cast<std::int32_t>(d[i]);
+            for (std::size_t j = i; j < 3; ++j, ++k) {
+                const std::int64_t own = disc ? disc_ * ((i == j ? kOne : 0) - n[i] * n[j]) / kOne : 0;
+                m.square[k] += sign * (d[i] * d[j] + own);
+            }
+        }
+        fitted_[slot] = 0;
+        if (m.count == 0) {
+            free_.push_back(slot);
+            erase(entry);
+        }
+    }
+}
+
+void VoxelMap::erase(std::size_t entry) {
+    // Entries that were pushed along by this one move back, so that no search ends early.
+    const std::size_t mask = table_.size() - 1;
+    std::size_t hole = entry;
+    std::size_t next = (hole + 1) & mask;
+    while (table_[next].key != kEmpty) {
+        const std::size_t home = home_of(table_[next].key);
+        if (((next - home) & mask) >= ((next - hole) & mask)) {
+            table_[hole] = table_[next];
+            hole = next;
+        }
+        next = (next + 1) & mask;
+    }
+    table_[hole] = Entry{};
+    --voxel_count_;
+}
+
+void VoxelMap::grow() {
+    std::vector<Entry> old(table_.size() * 2);
+    old.swap(table_);
+    for (const Entry& entry : old) {
+        if (entry.key != kEmpty) table_[locate(entry.key)] = entry;
+    }
+}
+
+void VoxelMap::fit(std::uint32_t slot) {
+    fitted_[slot] = 1;
+    const Moments& m = moments_[slot];
+    VoxelPlane& plane = planes_[slot];
+    plane.points = static_cast<std::uint32_t>(m.count);
+    const double n = m.count;
+    const Eigen::Vector3d mean = Eigen::Vector3d(m.sum[0], m.sum[1], m.sum[2]) / n;
+    const auto at = [&](std::size_t k) { return static_cast<double>(m.square[k]) / n; };
+    Eigen::Matrix3d covariance;
+    covariance << at(0), at(1), at(2), at(1), at(3), at(4), at(2), at(4), at(5);
+    covariance -= mean * mean.transpose();
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+    solver.computeDirect(covariance);
+    const Eigen::Vector3d deviation = solver.eigenvalues().cwiseMax(0.0).cwiseSqrt() * kMapUnit_m;
+    for (int i = 0; i < 3; ++i) {
+        plane.mean[i] = static_cast<float>(mean[i] * kMapUnit_m);
+        plane.normal[i] = static_cast<float>(solver.eigenvectors()(i, 0));
+        plane.tangent[i] = static_cast<float>(solver.eigenvectors()(i, 2));
+    }
+    plane.thickness_m = static_cast<float>(std::max(deviation[0], config_.noise_m));
+    plane.extent_m[0] = static_cast<float>(deviation[2]);
+    plane.extent_m[1] = static_cast<float>(deviation[1]);
+    plane.flat = deviation[0] <= config_.max_thickness_m && deviation[0] <= 0.5 * deviation[1];
+}
+
+}  // namespace dlod

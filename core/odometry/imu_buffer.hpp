@@ -1,0 +1,44 @@
+// The last IMU samples, readable at any time.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "core/types/imu_sample.hpp"
+
+namespace dlod {
+
+/// Keeps the newest samples in time order. What is no number, out of order or beyond any sensor's range is left out.
+class ImuBuffer {
+  public:
+    struct Reading {
+        Eigen::Vector3d angular_velocity_radps = Eigen::Vector3d::Zero();
+        Eigen::Vector3d acceleration_mps2 = Eigen::Vector3d::Zero();
+    };
+
+    /// @return number of samples that were taken over
+    int add(std::span<const ImuSample> samples);
+    void clear() { count_ = 0; }
+    bool empty() const { return count_ == 0; }
+    std::int64_t newest_ns() const;
+    std::int64_t oldest_ns() const;
+
+    /// Linear between samples; before the first and after the last, that sample's. The buffer must not be empty.
+    Reading at(std::int64_t time_ns) const;
+
+  private:
+    static constexpr std::size_t kCapacity = 512;
+    struct Stored {
+        std::int64_t stamp_ns;
+        Reading reading;
+    };
+    const Stored& stored(std::size_t i) const { return samples_[(first_ + i) % kCapacity]; }
+
+    std::array<Stored, kCapacity> samples_;
+    std::size_t first_ = 0;
+    std::size_t count_ = 0;
+};
+
+}  // namespace dlod

@@ -1,0 +1,248 @@
+#include "core/odometry/motion_filter.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+namespace dlod {
+namespace {
+
+// Order of the error state, in blocks of three.
+constexpr int kPosition = 0;
+constexpr int kRotation = 3;
+constexpr int kVelocity = 6;
+constexpr int kRate = 9;
+constexpr int kAccelerometerBias = 12;
+constexpr int kGravity = 15;
+
+constexpr double kPredictionStep_s = 2.5e-3;
+constexpr double kCovarianceStep_s = 0.1;
+// Variance of a block that the present mode does not know: so small that it stays what it is.
+constexpr double kFrozen = 1e-12;
+
+std::int64_t nanoseconds(double seconds) {
+    return std::llround(seconds * 1e9);
+}
+
+}  // namespace
+
+MotionFilter::MotionFilter(const MotionFilterConfig& config, const Eigen::Isometry3d& T_body_sensor)
+    : config_(config), T_body_sensor_(T_body_sensor) {}
+
+void MotionFilter::initialize(const Eigen::Isometry3d& T_world_sensor, const Eigen::Vector3d& gravity_mps2,
+                              std::int64_t stamp_ns, const ImuBuffer* imu) {
+    const Eigen::Isometry3d T_world_body = T_world_sensor * T_body_sensor_.inverse();
+    state_ = MotionState{};
+    state_.rotation = Eigen::Quaterniond(T_world_body.rotation()).normalized();
+    state_.position_m = T_world_body.translation();
+    state_.gravity_mps2 = gravity_mps2;
+    stamp_ns_ = stamp_ns;
+    covariance_.setZero();
+    const auto set = [&](int block, double deviation) {
+        covariance_.diagonal().segment<3>(block).setConstant(deviation * deviation);
+    };
+    set(kPosition, 1e-4);
+    set(kRotation, 1e-4);
+    set(kVelocity, 3.0);
+    imu_ = nullptr;
+    use_imu(imu);
+}
+
+void MotionFilter::use_imu(const ImuBuffer* imu) {
+    if (imu_ == nullptr && imu == nullptr) {
+        state_.rate_radps.setZero();
+    } else if (imu == nullptr) {
+        state_.rate_radps = body_rate(state_, stamp_ns_);
+    } else {
+        state_.rate_radps.setZero();
+    }
+    imu_ = imu;
+    const auto set = [&](int block, double deviation) {
+        covariance_.middleRows<3>(block).setZero();
+        covariance_.middleCols<3>(block).setZero();
+        covariance_.diagonal().segment<3>(block).setConstant(deviation * deviation);
+    };
+    set(kRate, imu != nullptr ? 0.01 : 1.0);
+    if (imu != nullptr) {
+        set(kAccelerometerBias, 0.05);
+        set(kGravity, 0.3);
+    } else {
+        state_.accelerometer_bias_mps2.setZero();
+        set(kAccelerometerBias, std::sqrt(kFrozen));
+        set(kGravity, std::sqrt(kFrozen));
+    }
+}
+
+Eigen::Vector3d MotionFilter::body_rate(const MotionState& s, std::int64_t time_ns) const {
+    if (imu_ == nullptr) return s.rate_radps;
+    return imu_->at(time_ns).angular_velocity_radps - s.rate_radps;
+}
+
+/// Moves the state by dt, which may be negative, with the readings in the middle.
+void MotionFilter::advance(MotionState& s, std::int64_t mid_ns, double dt) const {
+    Eigen::Vector3d rate = s.rate_radps;
+    Eigen::Vector3d acceleration;
+    if (imu_ != nullptr) {
+        const ImuBuffer::Reading reading = imu_->at(mid_ns);
+        rate = reading.angular_velocity_radps - s.rate_radps;
+        const Eigen::Quaterniond middle = s.rotation * so3_exp(0.5 * dt * rate);
+        acceleration = middle * (reading.acceleration_mps2 - s.accelerometer_bias_mps2) + s.gravity_mps2;
+    } else {
+        // A constant velocity in the body's axes: the path is an arc.
+        acceleration = (s.rotation * rate).cross(s.velocity_mps);
+    }
+    s.rotation = (s.rotation * so3_exp(dt * rate)).normalized();
+    s.position_m += dt * s.velocity_mps + 0.5 * dt * dt * acceleration;
+    s.velocity_mps += dt * acceleration;
+}
+
+void MotionFilter::predict(std::int64_t stamp_ns) {
+    while (stamp_ns_ < stamp_ns) {
+        const MotionState before = state_;
+        const std::int64_t target = std::min(stamp_ns, stamp_ns_ + nanoseconds(kCovarianceStep_s));
+        const double dt = static_cast<double>(target - stamp_ns_) * 1e-9;
+        const int steps = std::max(1, static_cast<int>(std::ceil(dt / kPredictionStep_s)));
+        const double h = dt / steps;
+        for (int i = 0; i < steps; ++i) advance(state_, stamp_ns_ + nanoseconds((i + 0.5) * h), h);
+        grow_covariance(before, (state_.velocity_mps - before.velocity_mps) / dt, dt);
+        stamp_ns_ = target;
+    }
+}
+
+void MotionFilter::grow_covariance(const MotionState& before, const Eigen::Vector3d& acceleration, double dt) {
+    Matrix F = Matrix::Identity();
+    Matrix Q = Matrix::Zero();
+    const Eigen::Matrix3d R = before.rotation.toRotationMatrix();
+    F.block<3, 3>(kPosition, kVelocity).diagonal().setConstant(dt);
+    const auto noise = [&](int block, double density) {
+        Q.diagonal().segment<3>(block).array() += density * density * dt;
+    };
+    double velocity_density;
+    if (imu_ != nullptr) {
+        const Eigen::Matrix3d force = skew(acceleration - before.gravity_mps2);
+        F.block<3, 3>(kRotation, kRate) = -dt * R;
+        F.block<3, 3>(kVelocity, kRotation) = -dt * force;
+        F.block<3, 3>(kVelocity, kAccelerometerBias) = -dt * R;
+        F.block<3, 3>(kVelocity, kGravity).diagonal().setConstant(dt);
+        F.block<3, 3>(kPosition, kRotation) = -0.5 * dt * dt * force;
+        F.block<3, 3>(kPosition, kAccelerometerBias) = -0.5 * dt * dt * R;
+        F.block<3, 3>(kPosition, kGravity).diagonal().setConstant(0.5 * dt * dt);
+        noise(kRotation, config_.gyro_noise);
+        noise(kRate, config_.gyro_bias_walk);
+        noise(kAccelerometerBias, config_.accelerometer_bias_walk);
+        velocity_density = config_.accelerometer_noise;
+    } else {
+        F.block<3, 3>(kRotation, kRate) = dt * R;
+        F.block<3, 3>(kVelocity, kRate) = -dt * skew(before.velocity_mps) * R;
+        noise(kRate, config_.angular_acceleration);
+        const double rotation = config_.angular_acceleration * config_.angular_acceleration * dt * dt * dt / 3.0;
+        Q.diagonal().segment<3>(kRotation).array() += rotation;
+        Q.block<3, 3>(kRotation, kRate) +=
+            0.5 * dt * dt * config_.angular_acceleration * config_.angular_acceleration * R;
+        Q.block<3, 3>(kRate, kRotation) = Q.block<3, 3>(kRotation, kRate).transpose();
+        velocity_density = config_.acceleration;
+    }
+    noise(kVelocity, velocity_density);
+    const double q = velocity_density * velocity_density;
+    Q.diagonal().segment<3>(kPosition).array() += q * dt * dt * dt / 3.0;
+    Q.block<3, 3>(kPosition, kVelocity).diagonal().array() += 0.5 * q * dt * dt;
+    Q.block<3, 3>(kVelocity, kPosition).diagonal().array() += 0.5 * q * dt * dt;
+    covariance_ = F * covariance_ * F.transpose() + Q;
+    covariance_ = 0.5 * (covariance_ + covariance_.transpose()).eval();
+}
+
+void MotionFilter::sweep(double duration_s, const Eigen::Vector3d& origin_m, SweepMotion& motion) const {
+    constexpr int kLast = SweepMotion::kKnots - 1;
+    const double h = duration_s / kLast;
+    motion.duration_s = static_cast<float>(duration_s);
+    MotionState s = state_;
+    s.position_m -= origin_m;
+    for (int k = kLast; k >= 0; --k) {
+        const Eigen::Matrix3d R = (s.rotation.toRotationMatrix() * T_body_sensor_.linear());
+        const Eigen::Vector3d t = s.position_m + s.rotation * T_body_sensor_.translation();
+        for (int i = 0; i < 3; ++i) {
+            for (int j = 0; j < 3; ++j) motion.rows[k][4 * i + j] = static_cast<float>(R(i, j));
+            motion.rows[k][4 * i + 3] = static_cast<float>(t[i]);
+        }
+        if (k > 0) advance(s, stamp_ns_ - nanoseconds((kLast - k + 0.5) * h), -h);
+    }
+}
+
+void MotionFilter::begin_update() {
+    prior_ = state_;
+    prior_information_ = covariance_.ldlt().solve(Matrix::Identity());
+    information_ = prior_information_;
+}
+
+MotionFilter::Step MotionFilter::step(const NormalEquations& equations) {
+    // The points' h is about (position, rotation) at their own time; dt turns it into (velocity, rate) at the stamp.
+    const double share = config_.information_share;
+    Matrix6d G = Matrix6d::Identity();
+    G.block<3, 3>(3, 3) = (imu_ != nullptr ? -1.0 : 1.0) * state_.rotation.toRotationMatrix();
+    information_ = prior_information_;
+    information_.block<6, 6>(0, 0) += share * equations.A[0];
+    const Matrix6d cross = share * equations.A[1] * G;
+    information_.block<6, 6>(0, 6) += cross;
+    information_.block<6, 6>(6, 0) += cross.transpose();
+    information_.block<6, 6>(6, 6) += share * G.transpose() * equations.A[2] * G;
+    Vector gradient = prior_information_ * difference(state_, prior_);
+    gradient.segment<6>(0) += share * equations.b[0];
+    gradient.segment<6>(6) += share * G.transpose() * equations.b[1];
+    const Vector error = information_.ldlt().solve(-gradient);
+    apply(state_, error);
+    return {error.segment<3>(kPosition).norm(), error.segment<3>(kRotation).norm()};
+}
+
+void MotionFilter::finish_update() {
+    covariance_ = information_.ldlt().solve(Matrix::Identity());
+    covariance_ = 0.5 * (covariance_ + covariance_.transpose()).eval();
+}
+
+MotionFilter::Vector MotionFilter::correction() const {
+    return difference(state_, prior_);
+}
+
+MotionFilter::Vector MotionFilter::difference(const MotionState& a, const MotionState& b) {
+    Vector d;
+    d << a.position_m - b.position_m, so3_log(a.rotation * b.rotation.conjugate()), a.velocity_mps - b.velocity_mps,
+        a.rate_radps - b.rate_radps, a.accelerometer_bias_mps2 - b.accelerometer_bias_mps2,
+        a.gravity_mps2 - b.gravity_mps2;
+    return d;
+}
+
+void MotionFilter::apply(MotionState& s, const Vector& error) {
+    s.position_m += error.segment<3>(kPosition);
+    s.rotation = (so3_exp(error.segment<3>(kRotation)) * s.rotation).normalized();
+    s.velocity_mps += error.segment<3>(kVelocity);
+    s.rate_radps += error.segment<3>(kRate);
+    s.accelerometer_bias_mps2 += error.segment<3>(kAccelerometerBias);
+    s.gravity_mps2 += error.segment<3>(kGravity);
+}
+
+void MotionFilter::set_motion(const Eigen::Vector3d& velocity_mps, const Eigen::Vector3d& rate_radps) {
+    state_.velocity_mps = velocity_mps;
+    state_.rate_radps = rate_radps;
+}
+
+Eigen::Isometry3d MotionFilter::T_world_sensor() const {
+    return orthonormalized(make_pose(state_.rotation, state_.position_m) * T_body_sensor_);
+}
+
+Eigen::Vector3d MotionFilter::sensor_angular_velocity() const {
+    return T_body_sensor_.linear().transpose() * body_rate(state_, stamp_ns_);
+}
+
+Eigen::Vector3d MotionFilter::sensor_linear_velocity() const {
+    const Eigen::Vector3d body = state_.rotation.conjugate() * state_.velocity_mps +
+                                 body_rate(state_, stamp_ns_).cross(T_body_sensor_.translation());
+    return T_body_sensor_.linear().transpose() * body;
+}
+
+Matrix6d MotionFilter::pose_covariance() const {
+    // The sensor sits at an offset from the body: a rotation about the body moves it.
+    Matrix6d J = Matrix6d::Identity();
+    J.block<3, 3>(0, 3) = -skew(state_.rotation * T_body_sensor_.translation());
+    return J * covariance_.block<6, 6>(0, 0) * J.transpose();
+}
+
+}  // namespace dlod

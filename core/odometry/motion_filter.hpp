@@ -1,0 +1,122 @@
+// Motion of the sensor as an iterated error-state Kalman filter.
+//
+// The body is the IMU (the sensor where there is none). With the IMU the state is pose, velocity, the two biases and
+// gravity, and the IMU's readings carry it on; without, the angular velocity takes the place of the gyro's bias and
+// stays constant but for white noise. The lidar measures the pose at the stamp and, as its points were fired over the
+// whole sweep, velocity and angular velocity (or gyro bias) too: deskewing and pose come out of one solution.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+
+#include "core/odometry/imu_buffer.hpp"
+#include "core/registration/normal_equations.hpp"
+#include "core/registration/sweep_motion.hpp"
+#include "core/types/lie.hpp"
+#include "core/types/parameter.hpp"
+
+namespace dlod {
+
+struct MotionFilterConfig {
+    double gyro_noise = 1e-3;
+    double accelerometer_noise = 0.05;
+    double gyro_bias_walk = 1e-4;
+    double accelerometer_bias_walk = 2e-3;
+    double acceleration = 0.8;
+    double angular_acceleration = 1.5;
+    double information_share = 0.02;
+
+    template <class V>
+    void visit(V& v) {
+        v.parameter("gyro_noise", gyro_noise, Range{1e-6, 1.0}, "rad/s/sqrt(Hz)",
+                    "noise density of the gyroscope, vibration included");
+        v.parameter("accelerometer_noise", accelerometer_noise, Range{1e-5, 10.0}, "m/s^2/sqrt(Hz)",
+                    "noise density of the accelerometer, vibration included");
+        v.parameter("gyro_bias_walk", gyro_bias_walk, Range{0.0, 1.0}, "rad/s^2/sqrt(Hz)",
+                    "how fast the gyroscope's bias wanders");
+        v.parameter("accelerometer_bias_walk", accelerometer_bias_walk, Range{0.0, 1.0}, "m/s^3/sqrt(Hz)",
+                    "how fast the accelerometer's bias wanders");
+        v.parameter("acceleration", acceleration, Range{0.01, 100.0}, "m/s^2/sqrt(Hz)",
+                    "without IMU: white acceleration of the robot");
+        v.parameter("angular_acceleration", angular_acceleration, Range{0.01, 100.0}, "rad/s^2/sqrt(Hz)",
+                    "without IMU: white angular acceleration");
+        v.parameter("information_share", information_share, Range{1e-4, 1.0}, "",
+                    "share of the points whose errors are independent; lower trusts the lidar less");
+    }
+};
+
+struct MotionState {
+    Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  ///< world from body
+    Eigen::Vector3d position_m = Eigen::Vector3d::Zero();          ///< of the body, world
+    Eigen::Vector3d velocity_mps = Eigen::Vector3d::Zero();        ///< of the body, world
+    Eigen::Vector3d rate_radps =
+        Eigen::Vector3d::Zero();  ///< body: bias of the gyroscope, or without IMU the angular velocity
+    Eigen::Vector3d accelerometer_bias_mps2 = Eigen::Vector3d::Zero();
+    Eigen::Vector3d gravity_mps2 = Eigen::Vector3d(0.0, 0.0, -9.80665);
+};
+
+class MotionFilter {
+  public:
+    static constexpr int kStates =
+        18;  ///< position, rotation (world, small angles), velocity, rate, accelerometer bias, gravity
+    using Vector = Eigen::Matrix<double, kStates, 1>;
+    using Matrix = Eigen::Matrix<double, kStates, kStates>;
+
+    MotionFilter(const MotionFilterConfig& config, const Eigen::Isometry3d& T_body_sensor);
+
+    /// Starts at a pose of the sensor, at rest as far as is known.
+    /// @param imu nullptr: none
+    void initialize(const Eigen::Isometry3d& T_world_sensor, const Eigen::Vector3d& gravity_mps2, std::int64_t stamp_ns,
+                    const ImuBuffer* imu);
+    /// Goes on with or without the IMU from the present pose and velocity.
+    void use_imu(const ImuBuffer* imu);
+    bool uses_imu() const { return imu_ != nullptr; }
+
+    void predict(std::int64_t stamp_ns);
+
+    /// The sweep that ends at the present state, in coordinates relative to `origin_m` (world).
+    void sweep(double duration_s, const Eigen::Vector3d& origin_m, SweepMotion& motion) const;
+
+    /// The update: begin, then any number of steps each linearised at the present state, then finish.
+    void begin_update();
+    struct Step {
+        double translation_m = 0.0;
+        double rotation_rad = 0.0;
+    };
+    Step step(const NormalEquations& equations);
+    void finish_update();
+    /// Back to the prediction.
+    void discard_update() { state_ = prior_; }
+    /// What the update has changed against the prediction, in standard deviations of the prediction, per block.
+    Vector correction() const;
+
+    const MotionState& state() const { return state_; }
+    /// Replaces velocity and rate, with their uncertainty as it is.
+    void set_motion(const Eigen::Vector3d& velocity_mps, const Eigen::Vector3d& rate_radps);
+    Eigen::Isometry3d T_world_sensor() const;
+    Eigen::Vector3d sensor_linear_velocity() const;   ///< sensor frame
+    Eigen::Vector3d sensor_angular_velocity() const;  ///< sensor frame
+    /// Of the sensor's translation, then rotation, world axes.
+    Matrix6d pose_covariance() const;
+    const Matrix& covariance() const { return covariance_; }
+    std::int64_t stamp_ns() const { return stamp_ns_; }
+
+  private:
+    void advance(MotionState& s, std::int64_t mid_ns, double dt) const;
+    Eigen::Vector3d body_rate(const MotionState& s, std::int64_t time_ns) const;
+    void grow_covariance(const MotionState& before, const Eigen::Vector3d& acceleration_world, double dt);
+    static Vector difference(const MotionState& a, const MotionState& b);
+    static void apply(MotionState& s, const Vector& error);
+
+    MotionFilterConfig config_;
+    Eigen::Isometry3d T_body_sensor_;
+    const ImuBuffer* imu_ = nullptr;
+    MotionState state_;
+    MotionState prior_;
+    Matrix covariance_ = Matrix::Identity();
+    Matrix prior_information_ = Matrix::Identity();
+    Matrix information_ = Matrix::Identity();
+    std::int64_t stamp_ns_ = 0;
+};
+
+}  // namespace dlod

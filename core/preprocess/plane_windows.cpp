@@ -1,0 +1,177 @@
+#include "core/preprocess/plane_windows.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/types/multiversion.hpp"
+
+namespace dlod {
+namespace {
+
+DLOD_MULTIVERSION
+void invert_ranges(const std::uint32_t* __restrict range_mm, float* __restrict inverse, int count, float offset_m) {
+    for (int c = 0; c < count; ++c) {
+        const float distance = static_cast<float>(static_cast<std::int32_t>(range_mm[c])) * 1e-3F - offset_m;
+        inverse[c] = distance > 1e-2F ? 1.0F / distance : 0.0F;
+    }
+}
+
+/// Sums over the five rows and columns of all windows of a row.
+DLOD_MULTIVERSION
+void fit_windows(const float* const* __restrict rows, const float (*__restrict weight)[kWindowPixels],
+                 const float* __restrict scale, const float* __restrict azimuth, const float* __restrict altitude,
+                 int width, float* __restrict inverse, float* __restrict slope_azimuth,
+                 float* __restrict slope_altitude, float* __restrict deviation) {
+    constexpr int kBlock = 64;
+    float a[kBlock], b[kBlock], g[kBlock], low[kBlock], squares[kBlock];
+    for (int start = 0; start < width; start += kBlock) {
+        const int n = std::min(kBlock, width - start);
+        for (int c = 0; c < kBlock; ++c) {
+            a[c] = b[c] = g[c] = squares[c] = 0.0F;
+            low[c] = 1e9F;
+        }
+        for (int k = 0; k < kWindowPixels; ++k) {
+            const float* __restrict f = rows[k / kWindowSide] + start + k % kWindowSide;
+            const float wa = weight[0][k];
+            const float wb = weight[1][k];
+            const float wg = weight[2][k];
+            for (int c = 0; c < n; ++c) {
+                a[c] += wa * f[c];
+                b[c] += wb * f[c];
+                g[c] += wg * f[c];
+                low[c] = low[c] < f[c] ? low[c] : f[c];
+            }
+        }
+        for (int k = 0; k < kWindowPixels; ++k) {
+            const float* __restrict f = rows[k / kWindowSide] + start + k % kWindowSide;
+            const float s = scale[k];
+            const float u = azimuth[k];
+            const float v = altitude[k];
+            for (int c = 0; c < n; ++c) {
+                const float e = f[c] * s - (a[c] + u * b[c] + v * g[c]);
+                squares[c] += e * e;
+            }
+        }
+        for (int c = 0; c < n; ++c) {
+            const bool whole = low[c] > 0.0F && a[c] > 1e-4F;
+            inverse[start + c] = whole ? a[c] : 0.0F;
+            slope_azimuth[start + c] = b[c];
+            slope_altitude[start + c] = g[c];
+            // d(range) = d(inverse) / inverse^2
+            deviation[start + c] =
+                whole ? std::sqrt(squares[c] * (1.0F / static_cast<float>(kWindowPixels))) / (a[c] * a[c]) : 0.0F;
+        }
+    }
+}
+
+}  // namespace
+
+PlaneWindows::PlaneWindows(const SensorModel& sensor)
+    : sensor_(sensor), R_sensor_lidar_(sensor.T_sensor_lidar.rotation().cast<float>()) {
+    const int h = sensor.height;
+    const int w = sensor.width;
+    const double per_column = 2.0 * std::numbers::pi / w;
+    inverse_.resize(h, w + 2 * kWindowRadius);
+    for (int m = 0; m < w; ++m) {
+        const double theta = 2.0 * std::numbers::pi - per_column * m;
+        cos_azimuth_.push_back(static_cast<float>(std::cos(theta)));
+        sin_azimuth_.push_back(static_cast<float>(std::sin(theta)));
+    }
+    // Position of a row's beams relative to the image's columns, in columns.
+    const auto offset_of = [&](int row) {
+        const auto r = static_cast<std::size_t>(row);
+        return static_cast<double>(sensor.azimuth_offset_rad[r]) / per_column - sensor.pixel_shift[r];
+    };
+    model_.resize(static_cast<std::size_t>(h));
+    usable_.resize(static_cast<std::size_t>(h));
+    for (int row = 0; row < h; ++row) {
+        RowModel& model = model_[static_cast<std::size_t>(row)];
+        model.first_row = std::clamp(row - kWindowRadius, 0, std::max(0, h - kWindowSide));
+        const double alt0 = sensor.altitude_rad[static_cast<std::size_t>(row)];
+        model.cos_altitude = static_cast<float>(std::cos(alt0));
+        model.sin_altitude = static_cast<float>(std::sin(alt0));
+        model.cos_offset = std::cos(sensor.azimuth_offset_rad[static_cast<std::size_t>(row)]);
+        model.sin_offset = -std::sin(sensor.azimuth_offset_rad[static_cast<std::size_t>(row)]);
+        Eigen::Matrix<double, kWindowPixels, 3> X;
+        for (int k = 0; k < kWindowPixels; ++k) {
+            const int other = std::min(model.first_row + k / kWindowSide, h - 1);
+            const double alt = sensor.altitude_rad[static_cast<std::size_t>(other)];
+            const double azimuth = (k % kWindowSide - kWindowRadius + offset_of(other) - offset_of(row)) * per_column;
+            const double depth = std::sin(alt0) * std::sin(alt) + std::cos(alt0) * std::cos(alt) * std::cos(azimuth);
+            X(k, 0) = 1.0;
+            X(k, 1) = std::cos(alt) * std::sin(azimuth) / depth;
+            X(k, 2) = (std::sin(alt) * std::cos(alt0) - std::cos(alt) * std::sin(alt0) * std::cos(azimuth)) / depth;
+            model.scale[k] = static_cast<float>(1.0 / depth);
+            model.azimuth[k] = static_cast<float>(X(k, 1));
+            model.altitude[k] = static_cast<float>(X(k, 2));
+        }
+        const Eigen::Matrix<double, 3, kWindowPixels> solver =
+            (X.transpose() * X + 1e-12 * Eigen::Matrix3d::Identity()).inverse() * X.transpose();
+        for (int i = 0; i < 3; ++i) {
+            for (int k = 0; k < kWindowPixels; ++k) {
+                model.weight[i][k] = static_cast<float>(solver(i, k)) * model.scale[k];
+            }
+        }
+        auto& usable = usable_[static_cast<std::size_t>(row)];
+        usable.assign(static_cast<std::size_t>(w), h >= kWindowSide ? 1 : 0);
+        for (int c = 0; c < w; ++c) {
+            int low = w;
+            int high = -1;
+            for (int k = 0; k < kWindowPixels; ++k) {
+                const int column = (c + k % kWindowSide - kWindowRadius + w) % w;
+                const int m = sensor.measurement_of(std::min(model.first_row + k / kWindowSide, h - 1), column);
+                low = std::min(low, m);
+                high = std::max(high, m);
+            }
+            if (high - low > w / 2) usable[static_cast<std::size_t>(c)] = 0;
+        }
+    }
+}
+
+void PlaneWindows::load(const Frame& frame) {
+    const int w = sensor_.width;
+    for (int r = 0; r < sensor_.height; ++r) {
+        float* row = inverse_.row(r);
+        invert_ranges(frame.raw.range_mm.row(r), row + kWindowRadius, w, sensor_.beam_origin_m);
+        for (int k = 0; k < kWindowRadius; ++k) {
+            row[k] = row[w + k];
+            row[w + kWindowRadius + k] = row[kWindowRadius + k];
+        }
+    }
+}
+
+void PlaneWindows::fit_row(int row, PlaneRow& planes) const {
+    const int w = sensor_.width;
+    const auto count = static_cast<std::size_t>(w);
+    for (auto* values : {&planes.inverse_range, &planes.slope_azimuth, &planes.slope_altitude, &planes.deviation_m}) {
+        values->resize(count);
+    }
+    const RowModel& model = model_[static_cast<std::size_t>(row)];
+    const float* rows[kWindowSide];
+    for (int i = 0; i < kWindowSide; ++i) rows[i] = inverse_.row(std::min(model.first_row + i, sensor_.height - 1));
+    fit_windows(rows, model.weight, model.scale, model.azimuth, model.altitude, w, planes.inverse_range.data(),
+                planes.slope_azimuth.data(), planes.slope_altitude.data(), planes.deviation_m.data());
+    const auto& usable = usable_[static_cast<std::size_t>(row)];
+    for (std::size_t c = 0; c < count; ++c) {
+        if (!usable[c]) planes.inverse_range[c] = 0.0F;
+    }
+}
+
+BeamFrame PlaneWindows::beam(int row, int column) const {
+    const auto r = static_cast<std::size_t>(row);
+    const auto m = static_cast<std::size_t>(sensor_.measurement_of(row, column));
+    const RowModel& model = model_[r];
+    const float c = cos_azimuth_[m] * model.cos_offset - sin_azimuth_[m] * model.sin_offset;
+    const float s = sin_azimuth_[m] * model.cos_offset + cos_azimuth_[m] * model.sin_offset;
+    BeamFrame frame;
+    frame.direction =
+        R_sensor_lidar_ * Eigen::Vector3f(c * model.cos_altitude, s * model.cos_altitude, model.sin_altitude);
+    // Columns grow clockwise: the azimuth falls.
+    frame.along_row = R_sensor_lidar_ * Eigen::Vector3f(s, -c, 0.0F);
+    frame.up = R_sensor_lidar_ * Eigen::Vector3f(-c * model.sin_altitude, -s * model.sin_altitude, model.cos_altitude);
+    return frame;
+}
+
+}  // namespace dlod

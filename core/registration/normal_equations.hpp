@@ -1,0 +1,38 @@
+// Normal equations of a registration whose points were fired at different times.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "core/types/image.hpp"
+#include "core/types/lie.hpp"
+
+namespace dlod {
+
+/// Linearised point-to-plane distances, structure of arrays. With a point's position q in the world, fired dt before
+/// the stamp from a sensor at s, its distance to a plane of normal n depends on the state's errors as
+///     residual + h . (dp + dt dv, dtheta + dt domega),   h = (n, (q - s) x n).
+struct PlaneMatches {
+    static constexpr std::size_t kLanes = 8;
+    std::array<AlignedVector<float>, 6> h;
+    AlignedVector<float> residual, weight, time_s;
+    std::size_t count = 0;
+
+    /// Makes room for n matches.
+    void reserve(std::size_t n);
+    void clear() { count = 0; }
+    void push(const float normal[3], const float lever[3], float distance, float inverse_variance, float time);
+};
+
+/// Sums of weight h h^T dt^k and weight h residual dt^k.
+struct NormalEquations {
+    std::array<Matrix6d, 3> A;
+    std::array<Vector6d, 2> b;
+    double weighted_squares = 0.0;  ///< sum of weight residual^2
+    std::size_t count = 0;
+};
+
+/// Sums up all matches. Pads the last lanes with matches of weight 0.
+void accumulate(PlaneMatches& matches, NormalEquations& equations);
+
+}  // namespace dlod

@@ -1,0 +1,107 @@
+#include "core/registration/scan_to_submap.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/registration/placed_point.hpp"
+
+namespace dlod {
+namespace {
+
+/// Voxel around q, and q relative to its centre.
+struct Cell {
+    VoxelIndex index;
+    float offset[3];
+};
+
+inline Cell cell_of(const float q[3], VoxelIndex origin, float side, float inverse_side) {
+    const float fx = std::floor(q[0] * inverse_side);
+    const float fy = std::floor(q[1] * inverse_side);
+    const float fz = std::floor(q[2] * inverse_side);
+    return {{origin.x + static_cast<std::int32_t>(fx), origin.y + static_cast<std::int32_t>(fy),
+             origin.z + static_cast<std::int32_t>(fz)},
+            {q[0] - (fx + 0.5F) * side, q[1] - (fy + 0.5F) * side, q[2] - (fz + 0.5F) * side}};
+}
+
+/// Distance to the voxel's Gaussian: across a plane all of it counts, else what exceeds two standard deviations.
+float distance_to(const VoxelPlane& plane, const float offset[3]) {
+    const float d[3] = {offset[0] - plane.mean[0], offset[1] - plane.mean[1], offset[2] - plane.mean[2]};
+    const float* n = plane.normal;
+    const float* t = plane.tangent;
+    const float u[3] = {n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]};
+    const float across = std::max(0.0F, std::abs(dot(d, n)) - (plane.flat ? 0.0F : 2.0F * plane.thickness_m));
+    const float along = std::max(0.0F, std::abs(dot(d, t)) - 2.0F * plane.extent_m[0]);
+    const float aside = std::max(0.0F, std::abs(dot(d, u)) - 2.0F * plane.extent_m[1]);
+    return std::sqrt(across * across + along * along + aside * aside);
+}
+
+/// The nearest of the Gaussians in the 26 voxels around an empty one.
+float distance_to_neighbours(VoxelMap& map, const Cell& cell, float side, float cap) {
+    float nearest = cap;
+    for (int dx = -1; dx <= 1; ++dx) {
+        for (int dy = -1; dy <= 1; ++dy) {
+            for (int dz = -1; dz <= 1; ++dz) {
+                const VoxelPlane* plane = map.find({cell.index.x + dx, cell.index.y + dy, cell.index.z + dz});
+                if (plane == nullptr) continue;
+                const float offset[3] = {cell.offset[0] - static_cast<float>(dx) * side,
+                                         cell.offset[1] - static_cast<float>(dy) * side,
+                                         cell.offset[2] - static_cast<float>(dz) * side};
+                nearest = std::min(nearest, distance_to(*plane, offset));
+            }
+        }
+    }
+    return nearest;
+}
+
+}  // namespace
+
+void ScanToSubmap::match(const PointSelection& points, std::span<const std::uint8_t> excluded,
+                         const SweepMotion& motion, VoxelMap& map, VoxelIndex origin, double widening,
+                         PlaneMatches& matches) const {
+    const auto side = static_cast<float>(map.voxel_m());
+    const float inverse_side = 1.0F / side;
+    const auto gate = static_cast<float>(config_.gate_m * widening);
+    const auto kernel = static_cast<float>(config_.kernel_m * widening);
+    const float inverse_kernel2 = 1.0F / (kernel * kernel);
+    const auto min_cosine = static_cast<float>(config_.min_normal_cosine);
+    matches.reserve(points.size());
+    matches.clear();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        if (points.planarity[i] <= 0.0F || excluded[i]) continue;
+        float T[12];
+        motion.at(points.time_s[i], T);
+        const PlacedPoint p = place(T, points.x[i], points.y[i], points.z[i]);
+        const Cell cell = cell_of(p.position, origin, side, inverse_side);
+        const VoxelPlane* plane = map.find(cell.index);
+        if (plane == nullptr || !plane->flat) continue;
+        const float d[3] = {cell.offset[0] - plane->mean[0], cell.offset[1] - plane->mean[1],
+                            cell.offset[2] - plane->mean[2]};
+        const float residual = dot(d, plane->normal);
+        if (std::abs(residual) > gate) continue;
+        const PlacedPoint normal = place(T, points.nx[i], points.ny[i], points.nz[i]);
+        if (std::abs(dot(normal.lever, plane->normal)) < min_cosine) continue;
+        const float fall = 1.0F / (1.0F + residual * residual * inverse_kernel2);
+        const float weight = points.planarity[i] * fall * fall / (plane->thickness_m * plane->thickness_m);
+        matches.push(plane->normal, p.lever, residual, weight, points.time_s[i]);
+    }
+}
+
+void ScanToSubmap::residuals(const PointSelection& points, const SweepMotion& motion, VoxelMap& map, VoxelIndex origin,
+                             AlignedVector<PixelIndex>& pixel, AlignedVector<float>& residual_m) const {
+    const auto side = static_cast<float>(map.voxel_m());
+    const float inverse_side = 1.0F / side;
+    const auto cap = static_cast<float>(config_.residual_cap_m);
+    pixel.assign(points.pixel.begin(), points.pixel.end());
+    residual_m.resize(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        float T[12];
+        motion.at(points.time_s[i], T);
+        const PlacedPoint p = place(T, points.x[i], points.y[i], points.z[i]);
+        const Cell cell = cell_of(p.position, origin, side, inverse_side);
+        const VoxelPlane* plane = map.find(cell.index);
+        residual_m[i] = plane != nullptr ? std::min(cap, distance_to(*plane, cell.offset))
+                                         : distance_to_neighbours(map, cell, side, cap);
+    }
+}
+
+}  // namespace dlod

@@ -1,0 +1,266 @@
+#include "driver/ip_reassembly.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <set>
+#include <string>
+
+#include "tests/support/network_bytes.hpp"
+
+namespace dlod::driver {
+namespace {
+
+using test::ByteVector;
+using test::payload_pattern;
+
+constexpr std::int64_t kMillisecond = 1'000'000;
+
+class IpReassemblyTest : public testing::Test {
+  protected:
+    /// The datagram that this fragment completes, or nothing.
+    ByteVector add(const ByteVector& ip_packet, std::int64_t time_ns = 0, std::uint32_t vlan = 0) {
+        const IpPacket p = parse_ip(ip_packet);
+        EXPECT_EQ(p.fault, IpFault::kNone);
+        const Bytes whole = reassembly_.add(p, vlan, time_ns);
+        return {whole.begin(), whole.end()};
+    }
+
+    /// All of them; the last datagram completed.
+    ByteVector add_all(const std::vector<ByteVector>& packets, std::int64_t time_ns = 0) {
+        ByteVector last;
+        for (const ByteVector& p : packets) {
+            if (ByteVector whole = add(p, time_ns); !whole.empty()) last = std::move(whole);
+        }
+        return last;
+    }
+
+    const ReassemblyCounters& counters() const { return reassembly_.counters(); }
+
+    IpReassembly reassembly_;
+};
+
+TEST_F(IpReassemblyTest, AnyOrderOfFragments) {
+    std::mt19937 random(1);
+    for (const bool ipv6 : {false, true}) {
+        for (std::uint32_t i = 0; i < 200; ++i) {
+            const ByteVector datagram = test::udp(payload_pattern(8448 + i % 24, i), {.ipv6 = ipv6});
+            auto fragments = test::ip_fragments(datagram, {.ipv6 = ipv6, .id = i});
+            std::shuffle(fragments.begin(), fragments.end(), random);
+            for (std::size_t n = 0; n + 1 < fragments.size(); ++n) EXPECT_TRUE(add(fragments[n]).empty());
+            EXPECT_EQ(add(fragments.back()), datagram);
+        }
+    }
+    EXPECT_EQ(counters().reassembled.value(), 400U);
+    EXPECT_EQ(counters().overlapping.value(), 0U);
+    EXPECT_EQ(counters().timed_out.value(), 0U);
+}
+
+TEST_F(IpReassemblyTest, DuplicatesAreIgnoredBeforeAndAfterCompletion) {
+    const ByteVector datagram = payload_pattern(5000, 1);
+    const auto fragments = test::ip_fragments(datagram, {.id = 9});
+    add(fragments[0]);
+    EXPECT_TRUE(add(fragments[0]).empty());
+    add(fragments[3]);
+    EXPECT_TRUE(add(fragments[3]).empty());
+    add(fragments[1]);
+    EXPECT_EQ(add(fragments[2]), datagram);
+    for (const ByteVector& f : fragments) EXPECT_TRUE(add(f, kMillisecond).empty());
+    EXPECT_EQ(counters().duplicate_fragments.value(), 6U);
+    EXPECT_EQ(counters().reassembled.value(), 1U);
+    reassembly_.finish();
+    EXPECT_EQ(counters().timed_out.value(), 0U);
+}
+
+TEST_F(IpReassemblyTest, TheSameIdAgainAfterCompletionIsANewDatagram) {
+    for (std::uint32_t i = 0; i < 10; ++i) {
+        const ByteVector datagram = payload_pattern(5000, i);
+        EXPECT_EQ(add_all(test::ip_fragments(datagram, {.id = 0})), datagram);
+    }
+    EXPECT_EQ(counters().reassembled.value(), 10U);
+}
+
+TEST_F(IpReassemblyTest, InterleavedDatagramsKeepApart) {
+    // One differs from the other in a single part of the key.
+    const ByteVector a = payload_pattern(5000, 1);
+    const ByteVector b = payload_pattern(5000, 2);
+    const auto first = test::ip_fragments(a, {.id = 5});
+    const std::vector<test::IpFields> others{{.source = 8, .id = 5},
+                                             {.destination = 2, .id = 5},
+                                             {.protocol = 6, .id = 5},
+                                             {.id = 6},
+                                             {.ipv6 = true, .id = 5}};
+    for (std::size_t k = 0; k < others.size(); ++k) {
+        const auto second = test::ip_fragments(b, others[k]);
+        const std::int64_t t = 10'000 * kMillisecond * static_cast<std::int64_t>(k);
+        for (std::size_t i = 0; i + 1 < first.size(); ++i) {
+            add(first[i], t);
+            add(second[i], t);
+        }
+        EXPECT_EQ(add(first.back(), t), a) << k;
+        EXPECT_EQ(add(second.back(), t), b) << k;
+    }
+    const std::int64_t t = 100'000 * kMillisecond;
+    for (std::size_t i = 0; i + 1 < first.size(); ++i) {
+        add(first[i], t, 1);
+        add(test::ip_fragments(b, {.id = 5})[i], t, 2);
+    }
+    EXPECT_EQ(add(first.back(), t, 1), a);
+}
+
+TEST_F(IpReassemblyTest, AnIdUsedAgainBeforeCompletionCondemnsBoth) {
+    const auto a = test::ip_fragments(payload_pattern(5000, 1), {.id = 5});
+    const auto b = test::ip_fragments(payload_pattern(5000, 2), {.id = 5});
+    add(a[0]);
+    add(a[1]);
+    for (const ByteVector& f : b) EXPECT_TRUE(add(f, kMillisecond).empty());
+    add(a[2]);
+    EXPECT_TRUE(add(a[3]).empty());
+    EXPECT_EQ(counters().overlapping.value(), 1U);
+    EXPECT_EQ(counters().rejected_fragments.value(), 5U);
+    // Once it has expired, the id is good again.
+    EXPECT_EQ(add_all(b, 3000 * kMillisecond), payload_pattern(5000, 2));
+    EXPECT_EQ(counters().timed_out.value(), 0U);
+}
+
+TEST_F(IpReassemblyTest, PartialOverlapsCondemnTheDatagram) {
+    const ByteVector datagram = payload_pattern(4000, 1);
+    const auto fine = test::ip_fragments(datagram, {.id = 5}, 1000);
+    const auto shifted = test::ip_fragments(datagram, {.id = 5}, 1008);
+    add(fine[0]);
+    EXPECT_TRUE(add(shifted[0]).empty());  // the same bytes and more: an overlap all the same
+    for (std::size_t i = 1; i < fine.size(); ++i) EXPECT_TRUE(add(fine[i]).empty());
+    EXPECT_EQ(counters().overlapping.value(), 1U);
+
+    const auto later = test::ip_fragments(datagram, {.id = 6}, 1008);
+    add(later[1]);
+    EXPECT_TRUE(add(test::ip_fragments(datagram, {.id = 6}, 1000)[1]).empty());
+    EXPECT_EQ(counters().overlapping.value(), 2U);
+}
+
+TEST_F(IpReassemblyTest, LengthsThatContradictCondemnTheDatagram) {
+    const auto longer = test::ip_fragments(payload_pattern(5000, 1), {.id = 5});
+    const auto shorter = test::ip_fragments(payload_pattern(2000, 1), {.id = 5});
+    add(longer[3]);
+    EXPECT_TRUE(add(shorter[1]).empty());  // a second end
+    EXPECT_EQ(counters().overlapping.value(), 1U);
+
+    const auto longer6 = test::ip_fragments(payload_pattern(5000, 1), {.id = 6});
+    const auto shorter6 = test::ip_fragments(payload_pattern(2000, 1), {.id = 6});
+    add(shorter6[1]);
+    EXPECT_TRUE(add(longer6[2]).empty());  // beyond the end
+    EXPECT_EQ(counters().overlapping.value(), 2U);
+
+    const auto longer7 = test::ip_fragments(payload_pattern(5000, 1), {.id = 7});
+    const auto shorter7 = test::ip_fragments(payload_pattern(2000, 1), {.id = 7});
+    add(longer7[2]);
+    EXPECT_TRUE(add(shorter7[1]).empty());  // an end before what is there
+    EXPECT_EQ(counters().overlapping.value(), 3U);
+}
+
+TEST_F(IpReassemblyTest, TimesOutInCaptureTime) {
+    const ByteVector datagram = payload_pattern(5000, 1);
+    const auto fragments = test::ip_fragments(datagram, {.id = 5});
+    add(fragments[0], 0);
+    // The old first fragment is gone when its id comes round.
+    EXPECT_EQ(add_all(fragments, 88'000 * kMillisecond), datagram);
+    EXPECT_EQ(counters().timed_out.value(), 1U);
+    // A clock set back counts as a timeout too.
+    add(fragments[0], 200'000 * kMillisecond);
+    EXPECT_EQ(add_all(fragments, 100'000 * kMillisecond), datagram);
+    EXPECT_EQ(counters().timed_out.value(), 2U);
+}
+
+TEST_F(IpReassemblyTest, TimesOutByFragmentsWhereTimeStandsStill) {
+    const auto old = test::ip_fragments(payload_pattern(2000, 1), {.id = 5});
+    add(old[0]);
+    for (std::uint32_t i = 6; i < 6 + 20'000; ++i) add_all(test::ip_fragments(payload_pattern(2000, i), {.id = i}));
+    const auto fresh = test::ip_fragments(payload_pattern(2000, 2), {.id = 5});
+    EXPECT_TRUE(add(fresh[1]).empty());
+    EXPECT_EQ(counters().timed_out.value(), 1U);
+    EXPECT_EQ(counters().reassembled.value(), 20'000U);
+}
+
+TEST_F(IpReassemblyTest, IsBoundedInNumber) {
+    for (std::uint32_t i = 0; i < 1000; ++i) add(test::ip_fragments(payload_pattern(5000, i), {.id = i})[0]);
+    EXPECT_EQ(counters().evicted.value(), 1000U - 64U);
+    // The newest are still there.
+    const auto last = test::ip_fragments(payload_pattern(5000, 999), {.id = 999});
+    add(last[1]);
+    add(last[2]);
+    EXPECT_EQ(add(last[3]), payload_pattern(5000, 999));
+    reassembly_.finish();
+    EXPECT_EQ(counters().timed_out.value(), 63U);
+}
+
+TEST_F(IpReassemblyTest, IsBoundedInFragments) {
+    const auto tiny = test::ip_fragments(payload_pattern(8 * 600, 1), {.id = 1}, 8);
+    EXPECT_TRUE(add_all(tiny).empty());
+    EXPECT_EQ(counters().evicted.value(), 1U);
+    EXPECT_EQ(counters().rejected_fragments.value(), 600U - 513U);
+}
+
+TEST_F(IpReassemblyTest, ImpossibleFragmentsAreMalformed) {
+    EXPECT_TRUE(add(test::ip(payload_pattern(1001, 1), {.more = true})).empty());     // not in steps of 8
+    EXPECT_TRUE(add(test::ip(payload_pattern(1480, 1), {.offset = 65528})).empty());  // beyond 64 KiB
+    EXPECT_TRUE(add(test::ip({}, {.offset = 800})).empty());                          // nothing
+    EXPECT_EQ(counters().malformed.value(), 3U);
+}
+
+/// Datagrams of a few senders and ids that come round at once, their fragments lost, duplicated and shuffled within a
+/// window: whatever passes UDP's checks must be a datagram that was sent.
+TEST(IpReassemblyFuzz, NothingEverMixes) {
+    const int rounds = test::fuzz_iterations(60);
+    std::mt19937 random(42);
+    const auto below = [&](std::uint32_t n) { return static_cast<std::uint32_t>(random() % n); };
+    std::uint64_t delivered = 0;
+    std::uint64_t refused = 0;
+    for (int round = 0; round < rounds; ++round) {
+        IpReassembly reassembly({.datagrams = 16});
+        struct Wire {
+            std::int64_t time_ns;
+            ByteVector packet;
+        };
+        std::vector<Wire> wire;
+        std::set<std::string> sent;
+        const std::uint32_t loss = below(30);
+        const std::int64_t spread = 1 + below(100) * kMillisecond;
+        for (std::uint32_t i = 0; i < 100; ++i) {
+            const bool ipv6 = below(4) == 0;
+            const unsigned source = 7 + below(2);
+            const ByteVector datagram =
+                test::udp(payload_pattern(2000 + 8 * below(3), 1000U * static_cast<unsigned>(round) + i),
+                          {.ipv6 = ipv6, .source = source});
+            sent.insert(test::key_of(datagram));
+            const std::int64_t time_ns = i * kMillisecond;
+            for (auto& f : test::ip_fragments(datagram, {.ipv6 = ipv6, .source = source, .id = below(6)}, 504)) {
+                if (below(100) < loss) continue;
+                const auto late = static_cast<std::int64_t>(random() % static_cast<std::uint64_t>(spread));
+                if (below(20) == 0) wire.push_back({time_ns + 2 * late, f});
+                wire.push_back({time_ns + late, std::move(f)});
+            }
+        }
+        std::stable_sort(wire.begin(), wire.end(), [](const Wire& x, const Wire& y) { return x.time_ns < y.time_ns; });
+        for (const Wire& w : wire) {
+            const IpPacket p = parse_ip(w.packet);
+            const Bytes whole = reassembly.add(p, 0, w.time_ns);
+            if (whole.empty()) continue;
+            const auto udp = parse_udp(p.source, p.destination, whole);
+            if (!udp || udp->length != whole.size() || udp->checksum != UdpChecksum::kRight) {
+                ++refused;
+                continue;
+            }
+            ++delivered;
+            ASSERT_TRUE(sent.contains(test::key_of({whole.begin(), whole.end()}))) << "round " << round;
+        }
+        const auto& c = reassembly.counters();
+        EXPECT_EQ(c.fragments.value(), wire.size());
+    }
+    EXPECT_EQ(delivered > 0, rounds > 0);
+    RecordProperty("delivered", static_cast<int>(delivered));
+    RecordProperty("refused_by_checksum", static_cast<int>(refused));
+}
+
+}  // namespace
+}  // namespace dlod::driver
