@@ -1,0 +1,170 @@
+#include "core/tracking/registered_displacement.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace dlod {
+
+namespace {
+
+constexpr float kOutlier_m = 0.15F;       // plane distances are bounded here
+constexpr float kMaxNeighbour_m = 0.5F;   // farther points have no counterpart
+constexpr int kIterations = 4;
+constexpr double kNoise_m = 0.04;         // of a plane distance: pose, range noise, curvature
+constexpr double kIndependent = 6.0;      // so many independent points are believed in, however many there are
+constexpr double kPrior = 1.5;            // log-odds that a displacement must gain to be believed in
+constexpr double kSlow_mps = 0.3;         // slower motions may hide in the noise
+constexpr double kMinObservable = 0.12;
+constexpr double kAgainst = -0.7;         // "stayed" for one more frame
+constexpr std::size_t kMinPoints = 8;
+
+/// Horizontal normal at a pixel from its neighbours to the right and below (or left and above).
+bool normal_at(const Frame& frame, PixelIndex pixel, Eigen::Vector3f& normal) {
+    const OdometryResult& o = frame.odometry;
+    const int width = o.x.width();
+    const int row = static_cast<int>(pixel) / width;
+    const int column = static_cast<int>(pixel) % width;
+    const auto at = [&](int r, int c) {
+        const auto i = static_cast<std::size_t>(r * width + (c + width) % width);
+        return Eigen::Vector3f(o.x[i], o.y[i], o.z[i]);
+    };
+    const Eigen::Vector3f p = at(row, column);
+    const float reach = 0.1F + 0.03F * p.norm();
+    const auto edge = [&](const Eigen::Vector3f& a, const Eigen::Vector3f& b, Eigen::Vector3f& out) {
+        const Eigen::Vector3f da = a - p, db = p - b;
+        const bool near_a = da.squaredNorm() < reach * reach, near_b = db.squaredNorm() < reach * reach;
+        out = near_a && near_b ? Eigen::Vector3f(da + db) : near_a ? da : db;
+        return near_a || near_b;
+    };
+    Eigen::Vector3f across, down;
+    if (!edge(at(row, column + 1), at(row, column - 1), across)) return false;
+    if (!edge(at(std::min(row + 1, o.x.height() - 1), column), at(std::max(row - 1, 0), column), down)) return false;
+    normal = across.cross(down);
+    const float length = normal.norm();
+    if (length < 1e-9F) return false;
+    normal /= length;
+    return true;
+}
+
+struct Match {
+    float normal_x = 0.0F, normal_y = 0.0F, distance_m = 0.0F;
+    bool found = false;
+};
+
+/// The nearest point before, and the distance to its tangent plane, of a point that is moved back by d.
+Match match(const PointSample& before, const PointSample& now, std::size_t i, const Eigen::Vector3f& between, const Eigen::Vector2f& d) {
+    const float px = now.x[i] + between.x() - d.x();
+    const float py = now.y[i] + between.y() - d.y();
+    const float pz = now.z[i] + between.z();
+    float nearest = std::numeric_limits<float>::max();
+    std::size_t index = 0;
+    for (std::size_t j = 0; j < before.size; ++j) {
+        const float dx = px - before.x[j], dy = py - before.y[j], dz = pz - before.z[j];
+        const float d2 = dx * dx + dy * dy + dz * dz;
+        if (d2 < nearest) {
+            nearest = d2;
+            index = j;
+        }
+    }
+    Match m;
+    m.found = nearest < kMaxNeighbour_m * kMaxNeighbour_m;
+    m.normal_x = before.nx[index];
+    m.normal_y = before.ny[index];
+    m.distance_m = m.normal_x * (px - before.x[index]) + m.normal_y * (py - before.y[index]);
+    return m;
+}
+
+/// Cost of a displacement and, for the next Gauss-Newton step, its normal equations.
+struct Fit {
+    double cost_m2 = 0.0;
+    Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
+    Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
+    int inliers = 0;
+};
+
+Fit fit(const PointSample& before, const PointSample& now, const Eigen::Vector2d& d) {
+    Fit f;
+    const Eigen::Vector3f between = (now.origin_m - before.origin_m).cast<float>();
+    for (std::size_t i = 0; i < now.size; ++i) {
+        const Match m = match(before, now, i, between, d.cast<float>());
+        const float bounded = m.found ? std::min(std::abs(m.distance_m), kOutlier_m) : kOutlier_m;
+        f.cost_m2 += bounded * bounded;
+        if (!m.found || std::abs(m.distance_m) > 2.0F * kOutlier_m) continue;
+        const Eigen::Vector2d n(m.normal_x, m.normal_y);
+        f.information += n * n.transpose();
+        f.gradient += n * static_cast<double>(m.distance_m);
+        ++f.inliers;
+    }
+    f.cost_m2 /= static_cast<double>(std::max<std::size_t>(1, now.size));
+    return f;
+}
+
+}  // namespace
+
+void sample_points(const Frame& frame, std::span<const PixelIndex> pixels, PointSample& out) {
+    const OdometryResult& o = frame.odometry;
+    const Eigen::Matrix3f R = o.T_world_sensor.linear().cast<float>();
+    out.origin_m = o.T_world_sensor.translation();
+    out.age_s = 0.0;
+    out.size = 0;
+    // Twice as many places as points: some have no normal.
+    const std::size_t places = std::min(pixels.size(), 2 * PointSample::kCapacity);
+    for (std::size_t k = 0; k < places && out.size < PointSample::kCapacity; ++k) {
+        // Evenly spread places; the order of pixels is that of the segment, so they cover it.
+        const PixelIndex pixel = pixels[(k * 2 + 1) * pixels.size() / (2 * places)];
+        Eigen::Vector3f n;
+        if (!normal_at(frame, pixel, n)) continue;
+        n = R * n;
+        const float level = n.head<2>().norm();
+        if (level < 0.3F) continue;
+        const Eigen::Vector3f p = R * Eigen::Vector3f(o.x[pixel], o.y[pixel], o.z[pixel]);
+        const std::size_t i = out.size++;
+        out.x[i] = p.x();
+        out.y[i] = p.y();
+        out.z[i] = p.z();
+        out.nx[i] = n.x() / level;
+        out.ny[i] = n.y() / level;
+    }
+}
+
+RegisteredDisplacement register_displacement(const PointSample& before, const PointSample& now, const Eigen::Vector2d& guess_m) {
+    RegisteredDisplacement best;
+    if (before.size < kMinPoints || now.size < kMinPoints) return best;
+    const Fit stayed = fit(before, now, Eigen::Vector2d::Zero());
+    best.stayed_m2 = best.moved_m2 = stayed.cost_m2;
+    if (stayed.inliers > 0) {
+        const Eigen::Matrix2d mean = stayed.information / stayed.inliers;
+        const double half_trace = 0.5 * mean.trace();
+        best.observable = half_trace - std::hypot(0.5 * (mean(0, 0) - mean(1, 1)), mean(0, 1));
+    }
+    for (const Eigen::Vector2d& start : {Eigen::Vector2d::Zero().eval(), guess_m}) {
+        Eigen::Vector2d d = start;
+        for (int k = 0; k < kIterations; ++k) {
+            const Fit f = fit(before, now, d);
+            if (f.cost_m2 < best.moved_m2) {
+                best.moved_m2 = f.cost_m2;
+                best.displacement_m = d;
+            }
+            if (f.inliers < static_cast<int>(kMinPoints) / 2) break;
+            // A weak pull keeps directions that the normals do not see where they are.
+            const Eigen::Matrix2d damped = f.information + 0.05 * f.inliers * Eigen::Matrix2d::Identity();
+            const Eigen::Vector2d step = damped.inverse() * f.gradient;
+            d += step;
+            if (step.norm() < 0.005) break;
+        }
+    }
+    return best;
+}
+
+double displacement_log_odds(const RegisteredDisplacement& r, double elapsed_s) {
+    if (r.stayed_m2 <= 0.0) return 0.0;
+    const double noise = kNoise_m * kNoise_m;
+    const double gain = 0.5 * kIndependent * (r.stayed_m2 - r.moved_m2) / std::max(noise, r.moved_m2);
+    if (gain > kPrior) return gain - kPrior;
+    const bool would_show = kSlow_mps * elapsed_s > 2.0 * kNoise_m && r.observable > kMinObservable;
+    return would_show && r.stayed_m2 < 2.0 * noise ? kAgainst : 0.0;
+}
+
+}  // namespace dlod

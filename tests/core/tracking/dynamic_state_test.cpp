@@ -1,0 +1,118 @@
+#include "core/tracking/dynamic_state.hpp"
+
+#include <gtest/gtest.h>
+
+namespace dlod {
+namespace {
+
+MotionCues free_cue(int free_points, int occupied_points) {
+    MotionCues c;
+    c.free_points = free_points;
+    c.occupied_points = occupied_points;
+    c.height_m = 1.7;
+    c.dt_s = 0.1;
+    c.moved_m = 0.5;
+    return c;
+}
+
+MotionCues paper_cue(double residual_m, double shift_m) {
+    MotionCues c;
+    c.average_residual_m = residual_m;
+    c.residual_points = 20;
+    c.height_m = 1.7;
+    c.shift_m = shift_m;
+    c.dt_s = 0.1;
+    return c;
+}
+
+DynamicStateConfig paper_config() {
+    DynamicStateConfig config;
+    config.use_free_space = false;
+    config.use_displacement = false;
+    return config;
+}
+
+TEST(DynamicState, PaperRuleNeedsHitsResidualAndDisplacement) {
+    const DynamicStateConfig config = paper_config();
+    const double high = config.theta_res * 1.7;  // exactly theta_res * h_S (Eq. 6)
+    MotionBelief all, no_residual, no_shift;
+    for (int n = 1; n <= 12; ++n) {
+        const bool turned = all.update(paper_cue(high, config.theta_disp_m), config);
+        EXPECT_EQ(turned, n == config.n_min);
+        EXPECT_EQ(all.state(), n < config.n_min ? DynamicState::kUndefined : DynamicState::kDynamic);
+        no_residual.update(paper_cue(0.99 * high, 5.0), config);
+        no_shift.update(paper_cue(2.0, 0.99 * config.theta_disp_m), config);
+        const DynamicState waiting = n < config.n_max ? DynamicState::kUndefined : DynamicState::kStatic;
+        EXPECT_EQ(no_residual.state(), waiting);
+        EXPECT_EQ(no_shift.state(), waiting);
+    }
+    // A static one may still turn dynamic; a dynamic one stays it.
+    EXPECT_TRUE(no_shift.update(paper_cue(high, 1.0), config));
+    for (int n = 0; n < 100; ++n) no_shift.update(paper_cue(0.0, 1.0), config);
+    EXPECT_EQ(no_shift.state(), DynamicState::kDynamic);
+}
+
+TEST(DynamicState, FreeSpaceDecidesWithinThreeFrames) {
+    const DynamicStateConfig config;
+    MotionBelief belief;
+    int frames = 0;
+    while (belief.state() != DynamicState::kDynamic && frames < 10) {
+        belief.update(free_cue(60, 20), config);
+        ++frames;
+    }
+    EXPECT_GE(frames, 2);
+    EXPECT_LE(frames, 3);
+}
+
+TEST(DynamicState, WhatWasThereBeforeIsStatic) {
+    const DynamicStateConfig config;
+    MotionBelief belief;
+    for (int n = 0; n < 10; ++n) belief.update(free_cue(2, 100), config);
+    EXPECT_EQ(belief.state(), DynamicState::kStatic);
+}
+
+// A new view through an opening: unknown is neither free nor occupied.
+TEST(DynamicState, TheUnknownSaysNothing) {
+    const DynamicStateConfig config;
+    MotionCues unknown = free_cue(0, 0);
+    unknown.unknown_points = 500;
+    EXPECT_EQ(motion_log_odds(unknown, config), 0.0);
+    MotionCues hardly = free_cue(6, 0);
+    hardly.unknown_points = 500;
+    EXPECT_LT(motion_log_odds(hardly, config), 0.2);
+    EXPECT_LT(free_share(unknown), 0.0);
+}
+
+TEST(DynamicState, EachCueCanBeSwitchedOff) {
+    DynamicStateConfig config;
+    MotionCues cues = free_cue(80, 0);
+    cues.average_residual_m = 2.0;
+    cues.residual_points = 10;
+    cues.displacement_log_odds = 0.7;
+    config.use_free_space = config.use_residual = config.use_displacement = false;
+    EXPECT_EQ(motion_log_odds(cues, config), 0.0);
+    config.use_displacement = true;
+    EXPECT_NEAR(motion_log_odds(cues, config), 0.7 * config.displacement_weight, 1e-12);
+    config.use_displacement = false;
+    config.use_residual = true;
+    EXPECT_NEAR(motion_log_odds(cues, config), 2.0 * config.residual_weight, 1e-12);
+    config.use_residual = false;
+    config.use_free_space = true;
+    EXPECT_GT(motion_log_odds(cues, config), 2.0);
+}
+
+TEST(DynamicState, AMistakeIsTakenBack) {
+    const DynamicStateConfig config;
+    MotionBelief belief;
+    for (int n = 0; n < 4; ++n) belief.update(free_cue(60, 10), config);
+    ASSERT_EQ(belief.state(), DynamicState::kDynamic);
+    int frames = 0;
+    while (belief.state() == DynamicState::kDynamic && frames < 50) {
+        belief.update(free_cue(0, 100), config);
+        ++frames;
+    }
+    EXPECT_LT(frames, 15);
+}
+
+}  // namespace
+}  // namespace dlod
