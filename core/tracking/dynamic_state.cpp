@@ -10,7 +10,7 @@ constexpr int kMinTested = 5;          // points: fewer say nothing about free s
 constexpr double kPatience = 10.0;     // tested points that count for half of full trust
 constexpr double kMaxLogOdds = 8.0;    // bounds keep a belief reversible
 constexpr double kMaxStep = 3.0;       // one frame alone never decides
-constexpr double kMovedAgain_m = 0.2;  // registered displacement that sets a rested object moving
+constexpr int kAwayDetections = 2;     // in a row off the place of rest: it has set off
 
 }  // namespace
 
@@ -54,22 +54,39 @@ DynamicState MotionBelief::by_paper(const MotionCues& cues, const DynamicStateCo
     return detections_ >= config.n_max ? DynamicState::kStatic : state_;
 }
 
+// At rest is what has stayed within a small circle: a slow walk leaves it, noise does not.
+void MotionBelief::rest(const MotionCues& cues, const DynamicStateConfig& config) {
+    const bool away = (cues.position_m - anchor_m_).norm() > config.rest_radius_m;
+    off_anchor_ = away ? off_anchor_ + 1 : 0;
+    rest_s_ += cues.dt_s;
+    if (away && !rested_) {
+        anchor_m_ = cues.position_m;
+        rest_s_ = 0.0;
+    }
+}
+
 DynamicState MotionBelief::fused(const MotionCues& cues, const DynamicStateConfig& config) {
     log_odds_ = std::clamp(log_odds_ + motion_log_odds(cues, config), config.static_log_odds - 0.5, kMaxLogOdds);
+    rest(cues, config);
     if (state_ == DynamicState::kDynamic) {
-        rest_s_ = cues.moved_m < config.rest_speed_mps ? rest_s_ + cues.dt_s : 0.0;
         rested_ = rest_s_ >= config.rest_time_s;
         const bool mistaken = log_odds_ <= config.static_log_odds;
         if (!rested_ && !mistaken) return state_;
-        rest_s_ = 0.0;
         log_odds_ = std::min(log_odds_, 0.0);
         return DynamicState::kStatic;
     }
-    // Where a rested object stands, free space was seen before it came: that says nothing of now.
-    const bool moves = rested_ ? cues.moved_m > kMovedAgain_m : log_odds_ >= config.dynamic_log_odds;
-    if (moves && detections_ >= config.min_hits) {
+    if (rested_) {
+        // Where a rested object stands, free space was seen before it came: that says nothing of now.
+        const bool set_off = off_anchor_ >= kAwayDetections;
+        if (!set_off) return state_;
         rested_ = false;
+        rest_s_ = 0.0;
+        anchor_m_ = cues.position_m;
         log_odds_ = std::max(log_odds_, config.dynamic_log_odds);
+    }
+    if (log_odds_ >= config.dynamic_log_odds && detections_ >= config.min_hits) {
+        rest_s_ = 0.0;
+        anchor_m_ = cues.position_m;
         return DynamicState::kDynamic;
     }
     const bool waited = detections_ >= config.n_max && log_odds_ < 0.5 * config.dynamic_log_odds;

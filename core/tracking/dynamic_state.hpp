@@ -20,7 +20,7 @@ struct MotionCues {
     int unknown_points = 0;
     double shift_m = 0.0;                ///< of the box centre from the track's first position, ground plane
     double displacement_log_odds = 0.0;  ///< of "moved" against "stayed", from the registration of its own points
-    double moved_m = 0.0;                ///< registered displacement within the last second, less its uncertainty
+    Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< filtered centre, ground plane
     double dt_s = 0.0;                   ///< since the detection before
 };
 
@@ -42,12 +42,15 @@ class MotionBelief {
 
   private:
     DynamicState by_paper(const MotionCues& cues, const DynamicStateConfig& config) const;
+    void rest(const MotionCues& cues, const DynamicStateConfig& config);
     DynamicState fused(const MotionCues& cues, const DynamicStateConfig& config);
 
     DynamicState state_ = DynamicState::kUndefined;
     double log_odds_ = 0.0;
     double rest_s_ = 0.0;
     int detections_ = 0;
+    Eigen::Vector2d anchor_m_ = Eigen::Vector2d::Zero();  ///< where it has rested for rest_s_
+    int off_anchor_ = 0;                                  ///< consecutive detections away from there
     bool rested_ = false;  ///< it was dynamic and came to rest: only a displacement moves it again
 };
 

@@ -10,7 +10,7 @@ namespace dlod {
 namespace {
 
 constexpr float kOutlier_m = 0.15F;       // plane distances are bounded here
-constexpr float kMaxNeighbour_m = 0.5F;   // farther points have no counterpart
+constexpr float kMaxNeighbour_m = 1.5F;   // planes end somewhere; as far as that a wall may have come into view
 constexpr int kIterations = 4;
 constexpr double kNoise_m = 0.04;         // of a plane distance: pose, range noise, curvature
 constexpr double kIndependent = 6.0;      // so many independent points are believed in, however many there are

@@ -13,7 +13,7 @@ namespace {
 constexpr int kYoungHits = 3;              // detections before a velocity means something
 constexpr double kHeadingSpeed_mps = 0.7;  // slower objects may move sideways
 constexpr double kElongated = 1.6;         // a principal axis says where an object points
-constexpr double kPastWindow_s = 1.0;
+constexpr double kReference_s = 0.45;     // points to register to are renewed that often
 
 const DetectionShape& largest_shape(const DetectionShapes& shapes, const Sighting& sighting) {
     return shapes[sighting.detections.front()];
@@ -64,7 +64,8 @@ TrackedObject::TrackedObject(std::uint32_t id, const Frame& frame, const Detecti
 void TrackedObject::predict(double dt_s, const TrackingConfig& config) {
     filter_.predict(dt_s, config.filter);
     unseen_s_ += dt_s;
-    for (std::size_t i = 0; i < past_size_; ++i) past_[i].age_s += dt_s;
+    before_.age_s += dt_s;
+    since_.age_s += dt_s;
     seen_now_ = false;
     ++age_;
 }
@@ -123,8 +124,8 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
     cues.height_m = visible_.size_m.z();
     cues.shift_m = (filter_.box().center_m - origin_m_).head<2>().norm();
     cues.dt_s = unseen_s_;
-    cues.moved_m = moved_m();
-    remember_position();
+    cues.position_m = filter_.box().center_m.head<2>();
+    if (config.state.use_displacement) cues.displacement_log_odds = displacement_cue(frame, sighting);
 
     ++hits_;
     misses_ = 0;
@@ -153,22 +154,26 @@ bool TrackedObject::dead(const TrackingConfig& config) const {
     return misses_ > (established ? config.max_misses : config.max_misses_undecided);
 }
 
-double TrackedObject::moved_m() const {
-    double moved = 0.0;
-    const Eigen::Vector2d now = filter_.box().center_m.head<2>();
-    const double sd = std::sqrt(filter_.covariance().topLeftCorner<2, 2>().trace());
-    for (std::size_t i = 0; i < past_size_; ++i) {
-        if (past_[i].age_s > kPastWindow_s) break;
-        moved = std::max(moved, (now - past_[i].position_m).norm() - 2.0 * std::hypot(sd, past_[i].sd_m));
+double TrackedObject::displacement_cue(const Frame& frame, const Sighting& sighting) {
+    PointSample now;
+    const Detection& part = frame.detection.detections[sighting.detections.front()];
+    sample_points(frame, std::span(frame.detection.pixels).subspan(part.first, part.count), now);
+    const Eigen::Vector2d center = filter_.box().center_m.head<2>();
+    double log_odds = 0.0;
+    if (hits_ == 0) {
+        before_ = since_ = now;
+        before_center_m_ = since_center_m_ = center;
+    } else {
+        const auto r = register_displacement(before_, now, center - before_center_m_);
+        log_odds = displacement_log_odds(r, before_.age_s);
     }
-    return moved;
-}
-
-void TrackedObject::remember_position() {
-    past_size_ = std::min(past_size_ + 1, kPast);
-    std::copy_backward(past_.begin(), past_.begin() + static_cast<std::ptrdiff_t>(past_size_) - 1,
-                       past_.begin() + static_cast<std::ptrdiff_t>(past_size_));
-    past_[0] = {0.0, filter_.box().center_m.head<2>(), std::sqrt(filter_.covariance().topLeftCorner<2, 2>().trace())};
+    if (since_.age_s > kReference_s) {
+        before_ = since_;
+        before_center_m_ = since_center_m_;
+        since_ = now;
+        since_center_m_ = center;
+    }
+    return log_odds;
 }
 
 ExpectedTrack TrackedObject::expected() const {

@@ -1,7 +1,6 @@
 // One track: its filter, what it remembers of the object's extent and past, and the belief that it moves.
 #pragma once
 
-#include <array>
 #include <span>
 
 #include "core/removal/box_history.hpp"
@@ -9,6 +8,7 @@
 #include "core/tracking/detection_shapes.hpp"
 #include "core/tracking/dynamic_state.hpp"
 #include "core/tracking/object_extent.hpp"
+#include "core/tracking/registered_displacement.hpp"
 
 namespace dlod {
 
@@ -48,21 +48,13 @@ class TrackedObject {
     int hits() const { return hits_; }
 
   private:
-    struct PastPosition {
-        double age_s = 0.0;  ///< before now
-        Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
-        double sd_m = 0.0;
-    };
-
     /// Which way the object points, from its motion or its shape; aligns the filter's axes and returns the noise.
     std::pair<double, double> measured_yaw(const PrincipalAxis& axis);
-    double moved_m() const;
-    void remember_position();
+    /// Registers this frame's points to earlier ones, and renews those.
+    double displacement_cue(const Frame& frame, const Sighting& sighting);
     /// Visible box of all parts at one yaw.
     static OrientedBox visible_box(const Frame& frame, const DetectionShapes& shapes, const Sighting& sighting,
                                    double yaw_rad);
-
-    static constexpr std::size_t kPast = 12;
 
     std::uint32_t id_;
     KalmanFilter filter_;
@@ -70,8 +62,9 @@ class TrackedObject {
     BoxHistory history_;
     OrientedBox visible_;  ///< of the last sighting; its centre is an offset from the filter's
     Eigen::Vector3d origin_m_;
-    std::array<PastPosition, kPast> past_;  ///< newest first
-    std::size_t past_size_ = 0;
+    PointSample before_;      ///< points of half a second to a second ago, or of the first sighting
+    PointSample since_;       ///< those that follow them
+    Eigen::Vector2d before_center_m_ = Eigen::Vector2d::Zero(), since_center_m_ = Eigen::Vector2d::Zero();
     double unseen_s_ = 0.0;
     double residual_m_ = 0.0;
     int points_ = 0;  ///< of the last sighting

@@ -80,7 +80,7 @@ struct DynamicStateConfig {
     double residual_weight = 0.3;
     double displacement_weight = 1.0;
     double rest_time_s = 3.0;
-    double rest_speed_mps = 0.15;
+    double rest_radius_m = 0.3;
 
     template <class V>
     void visit(V& v) {
@@ -112,7 +112,7 @@ struct DynamicStateConfig {
                     "scale of the log-odds of the registered displacement");
         v.parameter("rest_time_s", rest_time_s, Range{0.1, 600.0}, "s",
                     "a dynamic track that has rested this long is static again");
-        v.parameter("rest_speed_mps", rest_speed_mps, Range{0.01, 2.0}, "m/s", "slower is at rest");
+        v.parameter("rest_radius_m", rest_radius_m, Range{0.01, 5.0}, "m", "what stays within this distance is at rest; higher calls slow motion rest");
     }
 };
 

@@ -11,7 +11,6 @@ MotionCues free_cue(int free_points, int occupied_points) {
     c.occupied_points = occupied_points;
     c.height_m = 1.7;
     c.dt_s = 0.1;
-    c.moved_m = 0.5;
     return c;
 }
 
