@@ -6,11 +6,12 @@ namespace dlod {
 
 namespace {
 
-constexpr int kMinTested = 5;          // points: fewer say nothing about free space
-constexpr double kPatience = 10.0;     // tested points that count for half of full trust
-constexpr double kMaxLogOdds = 8.0;    // bounds keep a belief reversible
-constexpr double kMaxStep = 3.0;       // one frame alone never decides
-constexpr int kAwayDetections = 2;     // in a row off the place of rest: it has set off
+constexpr int kMinTested = 5;         // points: fewer say nothing about free space
+constexpr double kPatience = 10.0;    // tested points that count for half of full trust
+constexpr double kUnconfirmed = 0.3;  // trust in a displacement where no free space was tested
+constexpr double kMaxLogOdds = 8.0;   // bounds keep a belief reversible
+constexpr double kMaxStep = 3.0;      // one frame alone never decides
+constexpr int kAwayDetections = 2;    // in a row off the place of rest: it has set off
 
 }  // namespace
 
@@ -21,19 +22,26 @@ double free_share(const MotionCues& cues) {
 
 double motion_log_odds(const MotionCues& cues, const DynamicStateConfig& config) {
     double sum = 0.0;
+    double trust_in_displacement = 1.0;
     if (config.use_free_space) {
         const double share = free_share(cues);
+        trust_in_displacement = kUnconfirmed;
         if (share >= 0.0) {
             const double tested = cues.free_points + cues.occupied_points;
             const double known = tested / (tested + cues.unknown_points);
             sum += config.free_weight * (share - config.free_fraction) * known * tested / (tested + kPatience);
+            // What has moved stands, at least with its front, where free space was.
+            trust_in_displacement = std::min(1.0, share / config.free_fraction);
         }
     }
     if (config.use_residual && cues.residual_points > 0 && cues.height_m > 0.0) {
         const double ratio = cues.average_residual_m / std::max(1e-3, config.theta_res * cues.height_m);
         sum += config.residual_weight * std::clamp(ratio - 1.0, -1.0, 2.0);
     }
-    if (config.use_displacement) sum += config.displacement_weight * cues.displacement_log_odds;
+    if (config.use_displacement) {
+        const double moved = cues.displacement_log_odds;
+        sum += config.displacement_weight * (moved > 0.0 ? trust_in_displacement * moved : moved);
+    }
     return std::clamp(sum, -kMaxStep, kMaxStep);
 }
 

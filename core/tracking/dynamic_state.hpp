@@ -21,7 +21,7 @@ struct MotionCues {
     double shift_m = 0.0;                ///< of the box centre from the track's first position, ground plane
     double displacement_log_odds = 0.0;  ///< of "moved" against "stayed", from the registration of its own points
     Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< filtered centre, ground plane
-    double dt_s = 0.0;                   ///< since the detection before
+    double dt_s = 0.0;                                     ///< since the detection before
 };
 
 /// Share of the tested points that lie where free space was seen; negative where too few were tested to tell.

@@ -9,16 +9,18 @@ namespace dlod {
 
 namespace {
 
-constexpr float kOutlier_m = 0.15F;       // plane distances are bounded here
-constexpr float kMaxNeighbour_m = 1.5F;   // planes end somewhere; as far as that a wall may have come into view
+constexpr float kOutlier_m = 0.15F;      // plane distances are bounded here
+constexpr float kMaxNeighbour_m = 1.5F;  // planes end somewhere; as far as that a wall may have come into view
 constexpr int kIterations = 4;
-constexpr double kNoise_m = 0.04;         // of a plane distance: pose, range noise, curvature
-constexpr double kIndependent = 6.0;      // so many independent points are believed in, however many there are
-constexpr double kPrior = 1.5;            // log-odds that a displacement must gain to be believed in
-constexpr double kSlow_mps = 0.3;         // slower motions may hide in the noise
+constexpr double kNoise_m = 0.04;     // of a plane distance: pose, range noise, curvature
+constexpr double kIndependent = 6.0;  // so many independent points are believed in, however many there are
+constexpr double kPrior = 1.5;        // log-odds that a displacement must gain to be believed in
+constexpr double kSlow_mps = 0.3;     // slower motions may hide in the noise
 constexpr double kMinObservable = 0.12;
-constexpr double kAgainst = -0.7;         // "stayed" for one more frame
-constexpr std::size_t kMinPoints = 8;
+constexpr double kAgainst = -0.7;    // "stayed" for one more frame
+constexpr double kMaxFit_m = 0.06;   // a worse fit than that is none
+constexpr double kMaxLogOdds = 1.5;  // one registration is no proof
+constexpr std::size_t kMinPoints = 10;
 
 /// Horizontal normal at a pixel from its neighbours to the right and below (or left and above).
 bool normal_at(const Frame& frame, PixelIndex pixel, Eigen::Vector3f& normal) {
@@ -54,7 +56,8 @@ struct Match {
 };
 
 /// The nearest point before, and the distance to its tangent plane, of a point that is moved back by d.
-Match match(const PointSample& before, const PointSample& now, std::size_t i, const Eigen::Vector3f& between, const Eigen::Vector2f& d) {
+Match match(const PointSample& before, const PointSample& now, std::size_t i, const Eigen::Vector3f& between,
+            const Eigen::Vector2f& d) {
     const float px = now.x[i] + between.x() - d.x();
     const float py = now.y[i] + between.y() - d.y();
     const float pz = now.z[i] + between.z();
@@ -129,7 +132,8 @@ void sample_points(const Frame& frame, std::span<const PixelIndex> pixels, Point
     }
 }
 
-RegisteredDisplacement register_displacement(const PointSample& before, const PointSample& now, const Eigen::Vector2d& guess_m) {
+RegisteredDisplacement register_displacement(const PointSample& before, const PointSample& now,
+                                             const Eigen::Vector2d& guess_m) {
     RegisteredDisplacement best;
     if (before.size < kMinPoints || now.size < kMinPoints) return best;
     const Fit stayed = fit(before, now, Eigen::Vector2d::Zero());
@@ -162,7 +166,8 @@ double displacement_log_odds(const RegisteredDisplacement& r, double elapsed_s) 
     if (r.stayed_m2 <= 0.0) return 0.0;
     const double noise = kNoise_m * kNoise_m;
     const double gain = 0.5 * kIndependent * (r.stayed_m2 - r.moved_m2) / std::max(noise, r.moved_m2);
-    if (gain > kPrior) return gain - kPrior;
+    const bool fits = r.moved_m2 < kMaxFit_m * kMaxFit_m;
+    if (gain > kPrior) return fits ? std::min(gain - kPrior, kMaxLogOdds) : 0.0;
     const bool would_show = kSlow_mps * elapsed_s > 2.0 * kNoise_m && r.observable > kMinObservable;
     return would_show && r.stayed_m2 < 2.0 * noise ? kAgainst : 0.0;
 }

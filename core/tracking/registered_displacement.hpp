@@ -1,8 +1,8 @@
 // Has an object moved? Its own points are registered to those it had a while ago, in the ground plane.
 //
-// The shift of a box centre says little of a partly seen thing: more of a static object comes into view, and a wall seen
-// through an opening seems to move. Distances to tangent planes do not have these faults: a wall that slides along itself
-// still lies in its own plane, and a side that comes into view matches neither "stayed" nor "moved".
+// The shift of a box centre says little of a partly seen thing: more of a static object comes into view, and a wall
+// seen through an opening seems to move. Distances to tangent planes do not have these faults: a wall that slides along
+// itself still lies in its own plane, and a side that comes into view matches neither "stayed" nor "moved".
 #pragma once
 
 #include <Eigen/Core>
@@ -32,12 +32,14 @@ struct RegisteredDisplacement {
     Eigen::Vector2d displacement_m = Eigen::Vector2d::Zero();  ///< ground plane, that fits best
     double stayed_m2 = 0.0;  ///< mean squared distance to the tangent planes without displacement, outliers bounded
     double moved_m2 = 0.0;   ///< likewise with it
-    double observable = 0.0; ///< 0..1: how well the normals fix a displacement in the least visible direction (0.5: all alike)
+    double observable =
+        0.0;  ///< 0..1: how well the normals fix a displacement in the least visible direction (0.5: all alike)
 };
 
 /// Registers `now` to `before` by translation in the ground plane.
 /// @param guess_m where to start beside "stayed"
-RegisteredDisplacement register_displacement(const PointSample& before, const PointSample& now, const Eigen::Vector2d& guess_m);
+RegisteredDisplacement register_displacement(const PointSample& before, const PointSample& now,
+                                             const Eigen::Vector2d& guess_m);
 
 /// Log-odds of "moved" against "stayed": positive where a displacement explains the points much better than none,
 /// negative where they lie where they were and a motion would have shown.

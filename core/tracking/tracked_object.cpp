@@ -13,7 +13,7 @@ namespace {
 constexpr int kYoungHits = 3;              // detections before a velocity means something
 constexpr double kHeadingSpeed_mps = 0.7;  // slower objects may move sideways
 constexpr double kElongated = 1.6;         // a principal axis says where an object points
-constexpr double kReference_s = 0.45;     // points to register to are renewed that often
+constexpr double kReference_s = 0.45;      // points to register to are renewed that often
 
 const DetectionShape& largest_shape(const DetectionShapes& shapes, const Sighting& sighting) {
     return shapes[sighting.detections.front()];

@@ -62,8 +62,8 @@ class TrackedObject {
     BoxHistory history_;
     OrientedBox visible_;  ///< of the last sighting; its centre is an offset from the filter's
     Eigen::Vector3d origin_m_;
-    PointSample before_;      ///< points of half a second to a second ago, or of the first sighting
-    PointSample since_;       ///< those that follow them
+    PointSample before_;  ///< points of half a second to a second ago, or of the first sighting
+    PointSample since_;   ///< those that follow them
     Eigen::Vector2d before_center_m_ = Eigen::Vector2d::Zero(), since_center_m_ = Eigen::Vector2d::Zero();
     double unseen_s_ = 0.0;
     double residual_m_ = 0.0;

@@ -112,7 +112,8 @@ struct DynamicStateConfig {
                     "scale of the log-odds of the registered displacement");
         v.parameter("rest_time_s", rest_time_s, Range{0.1, 600.0}, "s",
                     "a dynamic track that has rested this long is static again");
-        v.parameter("rest_radius_m", rest_radius_m, Range{0.01, 5.0}, "m", "what stays within this distance is at rest; higher calls slow motion rest");
+        v.parameter("rest_radius_m", rest_radius_m, Range{0.01, 5.0}, "m",
+                    "what stays within this distance is at rest; higher calls slow motion rest");
     }
 };
 

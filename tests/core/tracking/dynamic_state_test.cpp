@@ -100,6 +100,19 @@ TEST(DynamicState, EachCueCanBeSwitchedOff) {
     EXPECT_GT(motion_log_odds(cues, config), 2.0);
 }
 
+// Registration alone errs where foliage is cut into other segments each time: free space must bear it out.
+TEST(DynamicState, ADisplacementCountsAsFarAsFreeSpaceBearsItOut) {
+    DynamicStateConfig config;
+    MotionCues contradicted = free_cue(0, 100);
+    const double without = motion_log_odds(contradicted, config);
+    contradicted.displacement_log_odds = 1.5;
+    EXPECT_EQ(motion_log_odds(contradicted, config), without);
+    MotionCues borne_out = free_cue(30, 70);
+    const double before = motion_log_odds(borne_out, config);
+    borne_out.displacement_log_odds = 1.5;
+    EXPECT_NEAR(motion_log_odds(borne_out, config), before + 1.5, 1e-12);
+}
+
 TEST(DynamicState, AMistakeIsTakenBack) {
     const DynamicStateConfig config;
     MotionBelief belief;
