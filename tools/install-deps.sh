@@ -9,7 +9,7 @@ packages=(
     # build
     g++ cmake ninja-build pkg-config ccache
     # core, driver, daemon
-    libeigen3-dev libpcap-dev libboost-dev libyaml-cpp-dev libspdlog-dev nlohmann-json3-dev libcli11-dev libsystemd-dev
+    libeigen3-dev libpcap-dev libboost-dev libyaml-cpp-dev libspdlog-dev libfmt-dev libcpp-httplib-dev nlohmann-json3-dev libcli11-dev libsystemd-dev
     libpcl-dev liblcm-dev liblcm-bin
     # tools
     libnanoflann-dev libopencv-dev libembree-dev gnuplot-nox
