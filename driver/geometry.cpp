@@ -10,7 +10,8 @@ namespace {
 
 /// A run of pixels of one row whose measurements follow each other.
 struct Beam {
-    float forward, left, up, beam_origin_m;
+    float forward, left, up;
+    float beam_origin_m, beam_origin_height_m, beam_origin_distance_m;
 };
 
 DLOD_MULTIVERSION
@@ -21,16 +22,18 @@ void place_points(std::size_t count, const std::uint32_t* __restrict range_mm, c
     const float left = beam.left;
     const float up = beam.up;
     const float n = beam.beam_origin_m;
+    const float h = beam.beam_origin_height_m;
+    const float d = beam.beam_origin_distance_m;
     const float r00 = T_sensor_lidar[0], r01 = T_sensor_lidar[1], r02 = T_sensor_lidar[2], tx = T_sensor_lidar[3];
     const float r10 = T_sensor_lidar[4], r11 = T_sensor_lidar[5], r12 = T_sensor_lidar[6], ty = T_sensor_lidar[7];
     const float r20 = T_sensor_lidar[8], r21 = T_sensor_lidar[9], r22 = T_sensor_lidar[10], tz = T_sensor_lidar[11];
     for (std::size_t i = 0; i < count; ++i) {
         // Ranges have at most 20 bits: the signed conversion is exact, and the only one that AVX2 has.
         const float r = static_cast<float>(static_cast<std::int32_t>(range_mm[i])) * 1e-3F;
-        const float rho = r - n;
+        const float rho = r - d;
         const float u = rho * forward + n;
         const float v = rho * left;
-        const float w = rho * up;
+        const float w = rho * up + h;
         const float lx = u * cos_theta[i] - v * sin_theta[i];
         const float ly = u * sin_theta[i] + v * cos_theta[i];
         const float px = r00 * lx + r01 * ly + (r02 * w + tx);
@@ -47,7 +50,8 @@ void place_points(std::size_t count, const std::uint32_t* __restrict range_mm, c
 
 }  // namespace
 
-Geometry::Geometry(const SensorModel& sensor) : width_(sensor.width), beam_origin_m_(sensor.beam_origin_m) {
+Geometry::Geometry(const SensorModel& sensor)
+    : width_(sensor.width), beam_origin_m_(sensor.beam_origin_m), beam_origin_height_m_(sensor.beam_origin_height_m) {
     for (int i = 0; i < 3; ++i) {
         for (int j = 0; j < 4; ++j)
             T_sensor_lidar_[4 * i + j] = static_cast<float>(sensor.T_sensor_lidar.matrix()(i, j));
@@ -68,9 +72,11 @@ Geometry::Geometry(const SensorModel& sensor) : width_(sensor.width), beam_origi
 }
 
 void Geometry::process(Frame& frame) const {
+    const float distance = std::hypot(beam_origin_m_, beam_origin_height_m_);
     for (std::size_t row = 0; row < rows_.size(); ++row) {
         const Row& constants = rows_[row];
-        const Beam beam{constants.forward, constants.left, constants.up, beam_origin_m_};
+        const Beam beam{constants.forward, constants.left,        constants.up,
+                        beam_origin_m_,    beam_origin_height_m_, distance};
         const auto shift = static_cast<std::size_t>(constants.shift);
         const auto width = static_cast<std::size_t>(width_);
         const std::size_t first = row * width;

@@ -29,6 +29,7 @@ class Geometry {
     };
     int width_;
     float beam_origin_m_;
+    float beam_origin_height_m_;
     float T_sensor_lidar_[12];  ///< row-major 3 x 4
     std::vector<Row> rows_;
     AlignedVector<float> cos_theta_;  ///< [W] by measurement

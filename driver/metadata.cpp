@@ -245,18 +245,21 @@ void read_beams(const Reader& reader, SensorInfo& info) {
     }
 }
 
-/// Firmware 1.x has no data_format: full turns, and shifts that bring the beams' azimuth offsets into line.
+/// Firmware 1.x has no data_format: its sensors all have 64 rows, full turns, and groups of four beams side by side.
 void assume_data_format(const Reader& reader, SensorInfo& info) {
-    reader.warn("data_format",
-                "missing, firmware 1.x is assumed: 16 columns a packet, pixel shifts from the azimuth offsets");
+    constexpr int kRows = 64;
+    constexpr int kBeamsSideBySide = 4;
+    constexpr int kShiftAt1024Columns = 6;
     SensorModel& model = info.model;
+    if (model.height != kRows)
+        reader.fail("data_format", "is missing, and can only be assumed for sensors with 64 rows");
+    reader.warn("data_format", "missing, that of firmware 1.x is assumed");
     info.columns_per_packet = kDefaultColumnsPerPacket;
     model.column_window_first = 0;
     model.column_window_last = model.width - 1;
-    const float lowest = *std::min_element(model.azimuth_offset_rad.begin(), model.azimuth_offset_rad.end());
-    for (const float azimuth : model.azimuth_offset_rad) {
-        const double columns = (static_cast<double>(azimuth) - lowest) * model.width / (2.0 * std::numbers::pi);
-        model.pixel_shift.push_back(static_cast<int>(std::lround(columns)));
+    for (int row = 0; row < model.height; ++row) {
+        const int beam = kBeamsSideBySide - 1 - row % kBeamsSideBySide;
+        model.pixel_shift.push_back(beam * kShiftAt1024Columns * model.width / 1024);
     }
 }
 
@@ -309,30 +312,31 @@ void read_data_format(const Reader& reader, SensorInfo& info) {
 void read_beam_origin(const Reader& reader, SensorInfo& info) {
     const std::string length_key = reader.path("beam_intrinsics", "lidar_origin_to_beam_origin_mm");
     const std::string transform_key = reader.path("beam_intrinsics", "beam_to_lidar_transform");
-    const std::optional<Eigen::Isometry3d> T_lidar_beam =
-        reader.transform("beam_intrinsics", "beam_to_lidar_transform");
-    const Json* length = reader.find("beam_intrinsics", "lidar_origin_to_beam_origin_mm");
-    if (length != nullptr) {
+    std::optional<double> length_mm;
+    if (const Json* length = reader.find("beam_intrinsics", "lidar_origin_to_beam_origin_mm")) {
         if (!length->is_number() || !(std::abs(length->get<double>()) <= kMaximumOffset_mm)) {
             reader.fail(length_key, "must be a number of millimetres");
         }
-        info.model.beam_origin_m = static_cast<float>(length->get<double>() * kMetresPerMillimetre);
-        if (T_lidar_beam && std::abs(T_lidar_beam->translation().x() - length->get<double>() * kMetresPerMillimetre) >
-                                kLengthTolerance_mm * kMetresPerMillimetre) {
+        length_mm = length->get<double>();
+    }
+    if (const auto T_lidar_beam = reader.transform("beam_intrinsics", "beam_to_lidar_transform")) {
+        const Eigen::Vector3d origin_mm = T_lidar_beam->translation() / kMetresPerMillimetre;
+        if (!T_lidar_beam->linear().isIdentity(kRotationTolerance) || std::abs(origin_mm.y()) > kLengthTolerance_mm) {
+            reader.fail(transform_key, "only beam origins off the axis along x and z are supported");
+        }
+        const auto contradicts = [&](double mm) { return std::abs(mm - *length_mm) > kLengthTolerance_mm; };
+        if (length_mm && contradicts(origin_mm.x()) && contradicts(origin_mm.norm())) {
             reader.fail(length_key, "contradicts " + transform_key);
         }
-    } else if (T_lidar_beam) {
         info.model.beam_origin_m = static_cast<float>(T_lidar_beam->translation().x());
-    } else {
-        const double assumed = product_defaults(info).beam_origin_mm;
-        info.model.beam_origin_m = static_cast<float>(assumed * kMetresPerMillimetre);
-        reader.warn(length_key, "missing, " + std::to_string(assumed) + " mm is assumed");
+        info.model.beam_origin_height_m = static_cast<float>(T_lidar_beam->translation().z());
+        return;
     }
-    if (T_lidar_beam) {
-        const bool radial = T_lidar_beam->linear().isIdentity(kRotationTolerance) &&
-                            T_lidar_beam->translation().tail<2>().norm() < kLengthTolerance_mm * kMetresPerMillimetre;
-        if (!radial) reader.fail(transform_key, "only beam origins that lie off the axis along x are supported");
+    if (!length_mm) {
+        length_mm = product_defaults(info).beam_origin_mm;
+        reader.warn(length_key, "missing, " + std::to_string(*length_mm) + " mm is assumed");
     }
+    info.model.beam_origin_m = static_cast<float>(*length_mm * kMetresPerMillimetre);
 }
 
 void read_transforms(const Reader& reader, SensorInfo& info) {

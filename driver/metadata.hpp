@@ -45,7 +45,7 @@ struct SensorInfo {
 /// Reads flat (firmware 1.x, 2.x) and nested metadata. Fields that geometry, decoding or ports need must be there and
 /// agree with each other. What firmware or reduced files are known to leave out is replaced, with a warning:
 /// - udp_profile_lidar: LEGACY (no warning, this is how old firmware says so)
-/// - the whole data_format of firmware 1.x: 16 columns a packet, pixel shifts from the azimuth offsets
+/// - the whole data_format of firmware 1.x (64 rows): 16 columns a packet, pixel shifts 18, 12, 6, 0 at 1024 columns
 /// - lidar_origin_to_beam_origin_mm: OS-0 27.67, OS-1 15.806 (12.163 with firmware 1.x), OS-2 13.762
 /// - lidar_to_sensor_transform: half a turn about z, raised by 36.18 mm (OS-2: 74.296 mm)
 /// - imu_to_sensor_transform: no turn, at 6.253, -11.775, 7.645 mm

@@ -14,7 +14,7 @@ packages=(
     # tools
     libnanoflann-dev libopencv-dev libembree-dev gnuplot-nox
     # tests
-    libgtest-dev libbenchmark-dev iproute2 systemd
+    libgtest-dev libbenchmark-dev nettle-dev iproute2 systemd
 )
 for argument in "$@"; do
     case $argument in

@@ -19,6 +19,7 @@ struct SensorModel {
     std::vector<float> azimuth_offset_rad;  ///< [height] beam azimuth offset, Ouster's sign
     std::vector<int> pixel_shift;           ///< [height] destagger shift: column = (measurement + shift) mod width
     float beam_origin_m = 0.0F;             ///< radial offset of the beam's origin from the lidar's axis
+    float beam_origin_height_m = 0.0F;      ///< and above the lidar's origin; 0 but for domes
     Eigen::Isometry3d T_sensor_lidar = Eigen::Isometry3d::Identity();
     Eigen::Isometry3d T_sensor_imu = Eigen::Isometry3d::Identity();
 

@@ -1,0 +1,579 @@
+#include "driver/frame_builder.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <vector>
+
+#include "driver/imu.hpp"
+#include "tests/driver/synthetic_sensor.hpp"
+
+namespace dlod::driver {
+namespace {
+
+using test::BuilderBench;
+using test::EmittedFrame;
+using test::SyntheticSensor;
+using test::SyntheticSetup;
+
+/// Pushes three clean frames; what came before must not have harmed them.
+void expect_clean_frames(BuilderBench& bench, std::uint32_t first_id) {
+    const std::size_t before = bench.emitted.size();
+    for (std::uint32_t k = 0; k < 3; ++k) bench.push_frame(first_id + k);
+    ASSERT_EQ(bench.emitted.size(), before + 3);
+    for (std::size_t k = 0; k < 3; ++k) {
+        EXPECT_EQ(bench.wrong_pixels(bench.emitted[before + k]), 0);
+        EXPECT_TRUE(bench.emitted[before + k].header.usable);
+    }
+}
+
+class EveryProfile : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(EveryProfile, DecodesWhatWasEncoded) {
+    for (const int rows : {16, 32, 64, 128}) {
+        for (const int columns : {512, 1024, 2048, 4096}) {
+            for (const int columns_per_packet : {16, 8}) {
+                if (columns_per_packet == 8 && columns != 512) continue;
+                const SyntheticSensor sensor({.profile = GetParam(),
+                                              .rows = rows,
+                                              .columns = columns,
+                                              .columns_per_packet = columns_per_packet});
+                BuilderBench bench(sensor);
+                bench.push_frame(65535);
+                ASSERT_EQ(bench.emitted.size(), 1U) << rows << " x " << columns;
+                const EmittedFrame& frame = bench.emitted[0];
+                EXPECT_EQ(bench.wrong_pixels(frame), 0) << rows << " x " << columns;
+                EXPECT_EQ(frame.header.valid_columns, columns);
+                EXPECT_EQ(frame.header.frame_id, 65535U);
+                EXPECT_EQ(frame.header.first_stamp_ns, sensor.time_ns(65535, 0));
+                EXPECT_EQ(frame.header.stamp_ns, sensor.time_ns(65535, columns - 1));
+                EXPECT_TRUE(frame.header.usable);
+                EXPECT_EQ(bench.faults(), 0U);
+            }
+        }
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(FrameBuilder, EveryProfile,
+                         ::testing::Values("LEGACY", "RNG19_RFL8_SIG16_NIR16", "RNG19_RFL8_SIG16_NIR16_DUAL",
+                                           "RNG15_RFL8_NIR8", "RNG15_RFL8_NIR8_DUAL", "FUSA_RNG15_RFL8_NIR8_DUAL"),
+                         [](const auto& profile) { return profile.param; });
+
+TEST(FrameBuilder, EmitsOnTheCompletingPacketWithItsReceiveTime) {
+    const SyntheticSensor sensor;
+    BuilderBench bench(sensor);
+    bench.push_frame(7, 0, sensor.packets_per_frame() - 1);
+    EXPECT_TRUE(bench.emitted.empty());
+    bench.push(sensor.packet(7, sensor.packets_per_frame() - 1));
+    ASSERT_EQ(bench.emitted.size(), 1U);
+    EXPECT_EQ(bench.emitted[0].header.receive_ns, bench.receive_ns);
+    EXPECT_EQ(bench.emitted[0].header.sequence, 0U);
+    for (int m = 0; m < 512; ++m) {
+        EXPECT_EQ(bench.emitted[0].columns.time_ns[static_cast<std::size_t>(m)], sensor.time_ns(7, m));
+        EXPECT_EQ(bench.emitted[0].columns.status[static_cast<std::size_t>(m)], 1U);
+    }
+}
+
+TEST(FrameBuilder, ColumnWindowDecidesWhenAFrameIsComplete) {
+    // Packets 5 .. 12 touch the window; columns outside of it are marked invalid by the sensor.
+    const SyntheticSensor sensor({.window_first = 90, .window_last = 200});
+    BuilderBench bench(sensor);
+    for (int i = 5; i <= 12; ++i) {
+        auto packet = sensor.packet(3, i);
+        for (int c = 0; c < 16; ++c) {
+            ColumnHeader header = sensor.column(packet, c);
+            header.status = header.measurement_id >= 90 && header.measurement_id <= 200 ? 1 : 0;
+            sensor.set_column(packet, c, header);
+        }
+        EXPECT_TRUE(bench.emitted.empty());
+        bench.push(packet);
+    }
+    ASSERT_EQ(bench.emitted.size(), 1U);
+    EXPECT_EQ(bench.emitted[0].header.valid_columns, 111);
+    EXPECT_EQ(bench.emitted[0].header.stamp_ns, sensor.time_ns(3, 200));
+    EXPECT_TRUE(bench.emitted[0].header.usable);
+    EXPECT_EQ(bench.wrong_pixels(bench.emitted[0]), 0);
+    EXPECT_EQ(bench.faults(), 0U);
+}
+
+TEST(FrameBuilder, ColumnWindowMayWrap) {
+    const SyntheticSensor sensor({.window_first = 370, .window_last = 85});
+    BuilderBench bench(sensor);
+    for (int i = 0; i <= 5; ++i) bench.push(sensor.packet(3, i));
+    for (int i = 23; i <= 30; ++i) bench.push(sensor.packet(3, i));
+    EXPECT_TRUE(bench.emitted.empty());
+    bench.push(sensor.packet(3, 31));
+    ASSERT_EQ(bench.emitted.size(), 1U);
+    EXPECT_EQ(bench.wrong_pixels(bench.emitted[0]), 0);
+    EXPECT_EQ(bench.counters().lost_packets.value(), 0U);
+}
+
+TEST(FrameBuilder, FrameIdWraps) {
+    const SyntheticSensor sensor;
+    BuilderBench bench(sensor);
+    for (std::uint32_t id = 65533; id < 65540; ++id) bench.push_frame(id);
+    ASSERT_EQ(bench.emitted.size(), 7U);
+    EXPECT_EQ(bench.emitted[2].header.frame_id, 65535U);
+    EXPECT_EQ(bench.emitted[3].header.frame_id, 0U);
+    EXPECT_EQ(bench.faults(), 0U);
+}
+
+TEST(FrameBuilder, LostPacketsLeaveZerosAndAreCounted) {
+    const SyntheticSensor sensor;
+    BuilderBench bench(sensor);
+    bench.push_frame(10);
+    for (int i = 0; i < 32; ++i) {
+        if (i != 4 && i != 5 && i != 31) bench.push(sensor.packet(11, i));
+    }
+    EXPECT_EQ(bench.emitted.size(), 1U);
+    bench.push_frame(12, 0, FrameBuilder::kPacketsToClose - 1);
+    EXPECT_EQ(bench.emitted.size(), 1U) << "closed too early for reordered packets";
+    bench.push_frame(12, FrameBuilder::kPacketsToClose - 1);
+    ASSERT_EQ(bench.emitted.size(), 3U);
+    const EmittedFrame& gappy = bench.emitted[1];
+    EXPECT_EQ(gappy.header.valid_columns, 512 - 48);
+    EXPECT_EQ(gappy.header.stamp_ns, sensor.time_ns(11, 495));
+    EXPECT_TRUE(gappy.header.usable);
+    EXPECT_EQ(gappy.columns.time_ns[64], 0);
+    EXPECT_EQ(gappy.columns.valid[64], 0);
+    EXPECT_EQ(bench.wrong_pixels(gappy), 0);
+    EXPECT_EQ(bench.wrong_pixels(bench.emitted[2]), 0);
+    EXPECT_EQ(bench.counters().lost_packets.value(), 3U);
+    EXPECT_EQ(bench.counters().incomplete_frames.value(), 1U);
+    EXPECT_EQ(bench.faults(), 4U);
+}
+
+TEST(FrameBuilder, MinimumShareOfColumnsDecidesUse) {
+    for (const int packets : {12, 13}) {
+        const SyntheticSensor sensor;
+        BuilderBench bench(sensor);
+        bench.push_frame(1);
+        bench.push_frame(2, 0, packets);  // 13 of 32 packets are the first above 0.4
+        bench.push_frame(3);
+        ASSERT_EQ(bench.emitted.size(), 3U);
+        EXPECT_EQ(bench.emitted[1].header.usable, packets == 13);
+        EXPECT_EQ(bench.counters().unusable_frames.value(), packets == 13 ? 0U : 1U);
+    }
+}
+
+TEST(FrameBuilder, WholeLostFramesAreCounted) {
+    const SyntheticSensor sensor;
+    BuilderBench bench(sensor);
+    bench.push_frame(1);
+    bench.push_frame(3);
+    bench.push_frame(10);
+    ASSERT_EQ(bench.emitted.size(), 3U);
+    for (const EmittedFrame& frame : bench.emitted) EXPECT_EQ(frame.header.valid_columns, 512);
+    EXPECT_EQ(bench.counters().lost_frames.value(), 1U + 6U);
+    EXPECT_EQ(bench.counters().implausible_packets.value(), 0U);
+}
+
+TEST(FrameBuilder, ReorderedAcrossTheEdgeLosesNothing) {
+    const SyntheticSensor sensor;
+    BuilderBench bench(sensor);
+    bench.push_frame(1, 0, 30);
+    bench.push(sensor.packet(2, 0));
+    bench.push(sensor.packet(1, 31));
+    bench.push(sensor.packet(2, 1));
+    bench.push(sensor.packet(2, 2));
+    bench.push(sensor.packet(1, 30));
+    ASSERT_EQ(bench.emitted.size(), 1U);
+    bench.push_frame(2, 3);
+    ASSERT_EQ(bench.emitted.size(), 2U);
+    for (const EmittedFrame& frame : bench.emitted) {
+        EXPECT_EQ(frame.header.valid_columns, 512);
+        EXPECT_EQ(bench.wrong_pixels(frame), 0);
+    }
+    EXPECT_EQ(bench.counters().reordered_packets.value(), 2U);
+    EXPECT_EQ(bench.faults(), 2U);
+}
+
+TEST(FrameBuilder, ReorderedWithinAFrame) {
+    const SyntheticSensor sensor;
+    BuilderBench bench(sensor);
+    for (std::uint32_t id = 1; id < 6; ++id) {
+        std::vector<int> order(32);
+        for (int i = 0; i < 32; ++i) order[static_cast<std::size_t>(i)] = i;
+        std::shuffle(order.begin(), order.end(), std::mt19937(id));
+        for (const int i : order) bench.push(sensor.packet(id, i));
+    }
+    ASSERT_EQ(bench.emitted.size(), 5U);
+    for (const EmittedFrame& frame : bench.emitted) EXPECT_EQ(bench.wrong_pixels(frame), 0);
+    EXPECT_GT(bench.counters().reordered_packets.value(), 50U);
+    EXPECT_EQ(bench.faults(), bench.counters().reordered_packets.value());
+}
+
+TEST(FrameBuilder, DuplicatesCountOnceEachEvenAfterTheFrameWasClosed) {
+    const SyntheticSensor sensor;
+    BuilderBench bench(sensor);
+    for (std::uint32_t id = 1; id < 4; ++id) {
+        for (int i = 0; i < 32; ++i) {
+            bench.push(sensor.packet(id, i));
+            bench.push(sensor.packet(id, i));
+        }
+    }
+    ASSERT_EQ(bench.emitted.size(), 3U);
+    for (const EmittedFrame& frame : bench.emitted) EXPECT_EQ(bench.wrong_pixels(frame), 0);
+    // The very first one cannot be told from a lone stranger until the second packet has come.
+    EXPECT_EQ(bench.counters().duplicate_packets.value() + bench.counters().implausible_packets.value(), 96U);
+    EXPECT_EQ(bench.counters().late_packets.value(), 0U);
+}
+
+TEST(FrameBuilder, LatePacketsAreDropped) {
+    const SyntheticSensor sensor;
+    BuilderBench bench(sensor);
+    bench.push_frame(1);
+    bench.push_frame(2, 0, 31);
+    bench.push_frame(3, 0, 10);
+    bench.push(sensor.packet(2, 31));
+    bench.push_frame(3, 10);
+    ASSERT_EQ(bench.emitted.size(), 3U);
+    EXPECT_EQ(bench.emitted[1].header.valid_columns, 496);
+    EXPECT_EQ(bench.counters().late_packets.value(), 1U);
+    EXPECT_EQ(bench.wrong_pixels(bench.emitted[2]), 0);
+}
+
+TEST(FrameBuilder, InvalidColumnsAreCountedAndZero) {
+    const SyntheticSensor sensor;
+    BuilderBench bench(sensor);
+    bench.push_frame(1, 0, 8);
+    auto packet = sensor.packet(1, 8);
+    for (const int c : {0, 3, 15}) {
+        ColumnHeader header = sensor.column(packet, c);
+        header.status = 0;
+        sensor.set_column(packet, c, header);
+    }
+    bench.push(packet);
+    bench.push_frame(1, 9);
+    ASSERT_EQ(bench.emitted.size(), 1U);
+    EXPECT_EQ(bench.emitted[0].header.valid_columns, 509);
+    EXPECT_EQ(bench.emitted[0].columns.time_ns[131], sensor.time_ns(1, 131)) << "an invalid column has a time";
+    EXPECT_EQ(bench.counters().invalid_columns.value(), 3U);
+    EXPECT_EQ(bench.wrong_pixels(bench.emitted[0]), 0);
+}
+
+TEST(FrameBuilder, AFrameWithoutAValidColumnIsNotUsable) {
+    const SyntheticSensor sensor;
+    BuilderBench bench(sensor);
+    for (int i = 0; i < 32; ++i) {
+        auto packet = sensor.packet(1, i);
+        for (int c = 0; c < 16; ++c) {
+            ColumnHeader header = sensor.column(packet, c);
+            header.status = 0;
+            sensor.set_column(packet, c, header);
+        }
+        bench.push(packet);
+    }
+    ASSERT_EQ(bench.emitted.size(), 1U);
+    EXPECT_EQ(bench.emitted[0].header.valid_columns, 0);
+    EXPECT_FALSE(bench.emitted[0].header.usable);
+    EXPECT_EQ(bench.wrong_pixels(bench.emitted[0]), 0);
+}
+
+TEST(FrameBuilder, ForeignSerialIsCountedAndTouchesNothing) {
+    const SyntheticSensor sensor;
+    SyntheticSensor other;
+    other.serial_number = 999;
+    BuilderBench bench(sensor);
+    for (std::uint32_t id = 1; id < 4; ++id) {
+        for (int i = 0; i < 32; ++i) {
+            bench.push(other.packet(id + 500, 31 - i));
+            bench.push(sensor.packet(id, i));
+        }
+    }
+    ASSERT_EQ(bench.emitted.size(), 3U);
+    for (const EmittedFrame& frame : bench.emitted) EXPECT_EQ(bench.wrong_pixels(frame), 0);
+    EXPECT_EQ(bench.counters().foreign_packets.value(), 96U);
+    EXPECT_EQ(bench.faults(), 96U);
+    EXPECT_EQ(bench.builder.foreign_serial(), 999U);
+}
+
+TEST(FrameBuilder, WithoutASerialTheSenderTellsSensorsApart) {
+    const SyntheticSensor sensor({.profile = "LEGACY"});
+    BuilderBench bench(sensor);
+    for (std::uint32_t id = 1; id < 4; ++id) {
+        for (int i = 0; i < 32; ++i) {
+            bench.sender[15] = std::byte{1};
+            bench.push(sensor.packet(id, i));
+            bench.sender[15] = std::byte{2};
+            bench.push(sensor.packet(id + 300, i));
+        }
+    }
+    ASSERT_EQ(bench.emitted.size(), 3U);
+    EXPECT_EQ(bench.counters().foreign_packets.value(), 96U);
+    // The first one falls silent: after a while the other is believed.
+    for (std::uint32_t id = 400; id < 405; ++id) bench.push_frame(id);
+    EXPECT_EQ(bench.emitted.back().header.frame_id, 404U);
+    EXPECT_EQ(bench.emitted.back().header.valid_columns, 512);
+}
+
+TEST(FrameBuilder, RestartInMidFrameClosesAndGoesOn) {
+    SyntheticSensor sensor;
+    BuilderBench bench(sensor);
+    bench.push_frame(500);
+    bench.push_frame(501, 0, 20);
+    sensor.init_id = 0x654321;
+    sensor.epoch_ns = 5'000'000'000;
+    bench.push_frame(0, 3);
+    ASSERT_EQ(bench.emitted.size(), 2U);
+    EXPECT_EQ(bench.emitted[1].header.frame_id, 501U);
+    EXPECT_EQ(bench.emitted[1].header.valid_columns, 320);
+    // Stragglers of before are no second restart.
+    sensor.init_id = 0x123456;
+    bench.push_frame(501, 20, 24);
+    EXPECT_EQ(bench.counters().restarts.value(), 1U);
+    EXPECT_EQ(bench.counters().late_packets.value(), 4U);
+    sensor.init_id = 0x654321;
+    bench.push_frame(1);
+    ASSERT_EQ(bench.emitted.size(), 4U);
+    EXPECT_EQ(bench.emitted[2].header.valid_columns, 512 - 48) << "both packets around the confirmation count";
+    EXPECT_EQ(bench.counters().restarts.value(), 1U);
+    EXPECT_EQ(bench.counters().implausible_packets.value(), 0U);
+    EXPECT_EQ(bench.counters().clock_jumps.value(), 0U) << "a restart explains another clock";
+}
+
+TEST(FrameBuilder, LegacySensorThatRestartsIsFollowed) {
+    const SyntheticSensor sensor({.profile = "LEGACY"});
+    BuilderBench bench(sensor);
+    bench.push_frame(5000);
+    bench.push_frame(5001);
+    bench.push_frame(0);
+    bench.push_frame(1);
+    EXPECT_EQ(bench.emitted.size(), 4U);
+    EXPECT_EQ(bench.counters().frame_id_jumps.value(), 1U);
+}
+
+TEST(FrameBuilder, AShortCapturePlayedAgainIsFollowed) {
+    const SyntheticSensor sensor;
+    BuilderBench bench(sensor);
+    for (int turn = 0; turn < 4; ++turn) {
+        for (std::uint32_t id = 1; id < 7; ++id) bench.push_frame(id);
+    }
+    // After the first turn, stragglers are believed after two frames' worth of packets at the latest.
+    EXPECT_GE(bench.emitted.size(), 6U + 3U * 4U);
+    EXPECT_GE(bench.counters().frame_id_jumps.value(), 3U);
+}
+
+TEST(FrameBuilder, GarbageHeadersCloseNoGoodFrame) {
+    const SyntheticSensor sensor;
+    BuilderBench bench(sensor);
+    std::mt19937 random(5);
+    bench.push_frame(100);
+    bench.push_frame(101, 0, 16);
+    std::uint64_t garbage = 0;
+    for (int i = 0; i < 200; ++i) {
+        auto packet = sensor.packet(101, i % 32);
+        const auto frame_id = static_cast<std::uint32_t>((101 + 2 + random() % 60000) % 65536);
+        const auto init_id = static_cast<std::uint32_t>(i % 3 == 0 ? random() % 0xFFFFFF : sensor.init_id);
+        sensor.layout().write_packet_header(
+            packet, {.frame_id = frame_id, .init_id = init_id, .serial_number = sensor.serial_number});
+        bench.push(packet);
+        ++garbage;
+    }
+    EXPECT_EQ(bench.emitted.size(), 1U);
+    bench.push_frame(101, 16);
+    ASSERT_EQ(bench.emitted.size(), 2U);
+    EXPECT_EQ(bench.emitted[1].header.valid_columns, 512);
+    EXPECT_EQ(bench.wrong_pixels(bench.emitted[1]), 0);
+    EXPECT_EQ(bench.counters().implausible_packets.value(), garbage);
+    expect_clean_frames(bench, 102);
+}
+
+TEST(FrameBuilder, WrongSizesAndTypesAreCounted) {
+    const SyntheticSensor sensor;
+    BuilderBench bench(sensor);
+    bench.push_frame(1);
+    for (const std::size_t size :
+         {std::size_t{0}, std::size_t{1}, std::size_t{47}, std::size_t{49}, sensor.layout().packet_bytes() - 1,
+          sensor.layout().packet_bytes() + 1, std::size_t{65507}}) {
+        bench.push(std::vector<std::byte>(size, std::byte{0xFF}));
+    }
+    EXPECT_EQ(bench.counters().wrong_size_packets.value(), 7U);
+    auto packet = sensor.packet(2, 0);
+    sensor.layout().write_packet_header(
+        packet, {.type = 2, .frame_id = 2, .init_id = sensor.init_id, .serial_number = sensor.serial_number});
+    bench.push(packet);
+    EXPECT_EQ(bench.counters().wrong_type_packets.value(), 1U);
+    expect_clean_frames(bench, 2);
+    EXPECT_EQ(bench.faults(), 8U);
+}
+
+TEST(FrameBuilder, MisnumberedColumnsAreNotTrusted) {
+    const SyntheticSensor sensor;
+    BuilderBench bench(sensor);
+    bench.push_frame(1);
+    bench.push_frame(2, 0, 9);
+    auto packet = sensor.packet(2, 9);
+    for (const auto& [column, id] : {std::pair{0, 65535}, std::pair{4, 3}, std::pair{9, 511}}) {
+        ColumnHeader header = sensor.column(packet, column);
+        header.measurement_id = static_cast<std::uint16_t>(id);
+        sensor.set_column(packet, column, header);
+    }
+    bench.push(packet);
+    auto damaged = sensor.packet(2, 10);
+    for (int c = 0; c < 16; ++c) {
+        ColumnHeader header = sensor.column(damaged, c);
+        header.measurement_id = static_cast<std::uint16_t>(600 + 37 * c);
+        sensor.set_column(damaged, c, header);
+    }
+    bench.push(damaged);
+    bench.push_frame(2, 10);
+    bench.push_frame(3);
+    ASSERT_EQ(bench.emitted.size(), 3U);
+    EXPECT_EQ(bench.emitted[1].header.valid_columns, 509);
+    EXPECT_EQ(bench.wrong_pixels(bench.emitted[1]), 0);
+    EXPECT_EQ(bench.counters().misnumbered_columns.value(), 3U);
+    EXPECT_EQ(bench.counters().damaged_packets.value(), 1U);
+}
+
+TEST(FrameBuilder, AbsurdColumnTimesAreNotTrusted) {
+    const SyntheticSensor sensor;
+    BuilderBench bench(sensor);
+    bench.push_frame(1);
+    const std::vector<std::uint64_t> absurd{0, ~0ULL, 1ULL << 63U, static_cast<std::uint64_t>(sensor.time_ns(90, 0)),
+                                            static_cast<std::uint64_t>(sensor.time_ns(2, 128)) - 1'000'000};
+    for (int i = 0; i < 32; ++i) {
+        auto packet = sensor.packet(2, i);
+        for (std::size_t k = 0; k < absurd.size(); ++k) {
+            if (i != static_cast<int>(4 + 2 * k)) continue;
+            ColumnHeader header = sensor.column(packet, 7);
+            header.time_ns = absurd[k];
+            sensor.set_column(packet, 7, header);
+        }
+        bench.push(packet);
+    }
+    ASSERT_EQ(bench.emitted.size(), 2U);
+    EXPECT_EQ(bench.emitted[1].header.valid_columns, 512 - 5);
+    EXPECT_EQ(bench.counters().mistimed_columns.value(), 5U);
+    EXPECT_EQ(bench.wrong_pixels(bench.emitted[1]), 0);
+    for (std::size_t m = 0; m < 512; ++m) {
+        const std::int64_t expected =
+            bench.emitted[1].columns.valid[m] != 0 ? sensor.time_ns(2, static_cast<int>(m)) : 0;
+        EXPECT_EQ(bench.emitted[1].columns.time_ns[m], expected);
+    }
+    expect_clean_frames(bench, 3);
+}
+
+TEST(FrameBuilder, ClockJumpsBetweenFramesAreCounted) {
+    SyntheticSensor sensor;
+    BuilderBench bench(sensor);
+    bench.push_frame(1);
+    bench.push_frame(2);
+    sensor.epoch_ns -= 37'000'000'000;
+    bench.push_frame(3);
+    bench.push_frame(4);
+    EXPECT_EQ(bench.emitted.size(), 4U);
+    EXPECT_EQ(bench.counters().clock_jumps.value(), 1U);
+    EXPECT_EQ(bench.counters().mistimed_columns.value(), 0U);
+}
+
+TEST(FrameBuilder, WithoutFreeFramesWholeFramesAreDropped) {
+    const SyntheticSensor sensor;
+    BuilderBench bench(sensor);
+    bench.push_frame(1);
+    std::vector<Frame*> taken;
+    taken.swap(bench.free_frames);
+    bench.push_frame(2);
+    bench.push_frame(3, 0, 16);
+    taken.swap(bench.free_frames);
+    bench.push_frame(3, 16);
+    EXPECT_EQ(bench.emitted.size(), 1U);
+    EXPECT_EQ(bench.counters().dropped_frames.value(), 2U);
+    EXPECT_EQ(bench.counters().dropped_packets.value(), 64U);
+    expect_clean_frames(bench, 4);
+    EXPECT_EQ(bench.emitted.back().header.sequence, 3U);
+}
+
+TEST(FrameBuilder, FlushEmitsWhatIsThere) {
+    const SyntheticSensor sensor;
+    BuilderBench bench(sensor);
+    bench.push_frame(1, 12);
+    bench.push_frame(2, 0, 30);
+    bench.push_frame(3, 0, 2);
+    bench.builder.flush();
+    ASSERT_EQ(bench.emitted.size(), 3U);
+    EXPECT_EQ(bench.emitted[0].header.valid_columns, 320);
+    EXPECT_EQ(bench.emitted[1].header.valid_columns, 480);
+    EXPECT_EQ(bench.emitted[2].header.valid_columns, 32);
+    EXPECT_EQ(bench.counters().lost_packets.value(), 2U) << "neither the capture's start nor its end is a loss";
+    EXPECT_EQ(bench.free_frames.size(), 3U);
+    bench.builder.flush();
+    EXPECT_EQ(bench.emitted.size(), 3U);
+}
+
+TEST(FrameBuilder, FlushBelievesACaptureOfOnePacket) {
+    const SyntheticSensor sensor;
+    BuilderBench bench(sensor);
+    bench.push(sensor.packet(892, 3));
+    EXPECT_TRUE(bench.emitted.empty());
+    bench.builder.flush();
+    ASSERT_EQ(bench.emitted.size(), 1U);
+    EXPECT_EQ(bench.emitted[0].header.valid_columns, 16);
+    EXPECT_EQ(bench.wrong_pixels(bench.emitted[0]), 0);
+}
+
+std::vector<std::byte> imu_packet(std::int64_t stamp_ns, float x = 0.0F) {
+    std::vector<std::byte> bytes(kLegacyImuPacketBytes);
+    encode_imu_packet(bytes, {.stamp_ns = stamp_ns, .acceleration_mps2 = {x, 0.0F, 9.81F}}, stamp_ns);
+    return bytes;
+}
+
+TEST(FrameBuilder, ImuSamplesComeWithTheFrameTheyPrecede) {
+    const SyntheticSensor sensor;
+    BuilderBench bench(sensor);
+    // Samples every 10 ms; each is sent when the next frame's third packet goes out, and two are swapped.
+    std::vector<std::int64_t> expected;
+    for (std::uint32_t id = 1; id < 4; ++id) {
+        for (int i = 0; i < 32; ++i) {
+            bench.push(sensor.packet(id, i));
+            if (i % 4 == 1) bench.push(imu_packet(sensor.time_ns(id, i < 16 ? i * 16 + 90 : i * 16 - 10)));
+        }
+    }
+    bench.push(imu_packet(sensor.time_ns(3, 511) + 1));
+    bench.push_frame(4);
+    ASSERT_EQ(bench.emitted.size(), 4U);
+    for (int k = 0; k < 3; ++k) {
+        const EmittedFrame& frame = bench.emitted[static_cast<std::size_t>(k)];
+        EXPECT_EQ(frame.imu.size(), 8U);
+        for (std::size_t j = 0; j < frame.imu.size(); ++j) {
+            EXPECT_LE(frame.imu[j].stamp_ns, frame.header.stamp_ns);
+            const std::int64_t previous_ns = j == 0 ? 0 : frame.imu[j - 1].stamp_ns;
+            EXPECT_GT(frame.imu[j].stamp_ns, previous_ns);
+        }
+    }
+    ASSERT_EQ(bench.emitted[3].imu.size(), 1U);
+    EXPECT_EQ(bench.emitted[3].imu[0].stamp_ns, sensor.time_ns(3, 511) + 1);
+    EXPECT_EQ(bench.faults(), 0U);
+}
+
+TEST(FrameBuilder, ImuFaultsAreCounted) {
+    const SyntheticSensor sensor;
+    BuilderBench bench(sensor);
+    bench.push_frame(1, 0, 8);
+    bench.push(imu_packet(sensor.time_ns(1, 100)));
+    bench.push(imu_packet(sensor.time_ns(1, 100)));                    // twice
+    bench.push(imu_packet(sensor.time_ns(1, 0) + 3'600'000'000'000));  // an hour ahead
+    bench.push(imu_packet(0));
+    bench.push(imu_packet(sensor.time_ns(1, 101), std::numeric_limits<float>::quiet_NaN()));
+    bench.push(imu_packet(sensor.time_ns(1, 102), 1e9F));
+    bench.sender[0] = std::byte{9};
+    bench.push(imu_packet(sensor.time_ns(1, 103)));
+    bench.port = sensor.info().imu_port;
+    bench.push(std::vector<std::byte>(64));
+    bench.port = sensor.info().lidar_port;
+    bench.sender[0] = std::byte{0};
+    bench.push_frame(1, 8);
+    ASSERT_EQ(bench.emitted.size(), 1U);
+    ASSERT_EQ(bench.emitted[0].imu.size(), 1U);
+    EXPECT_EQ(bench.emitted[0].imu[0].stamp_ns, sensor.time_ns(1, 100));
+    EXPECT_EQ(bench.counters().imu_packets.value(), 4U);
+    EXPECT_EQ(bench.counters().imu_rejected_samples.value(), 3U);
+    EXPECT_EQ(bench.counters().imu_invalid_packets.value(), 2U);
+    EXPECT_EQ(bench.counters().foreign_packets.value(), 1U);
+    EXPECT_EQ(bench.counters().imu_unknown_packets.value(), 1U);
+    EXPECT_EQ(bench.faults(), 7U);
+}
+
+}  // namespace
+}  // namespace dlod::driver
