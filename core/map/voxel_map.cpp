@@ -3,13 +3,13 @@
 #include <Eigen/Dense>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 namespace dlod {
 namespace {
 
-constexpr std::size_t kInitialTable = std::size_t{1} << 16;
+constexpr std::size_t kInitialTable = std::size_t{1} << 13;  // blocks
+constexpr std::size_t kInitialVoxels = std::size_t{1} << 15;
 
 std::int32_t floor_divide(std::int32_t a, std::int32_t b) {
     const std::int32_t q = a / b;
@@ -24,16 +24,20 @@ VoxelMap::VoxelMap(const VoxelMapConfig& config) : config_(config) {
     const double radius = config.surfel_radius_m / kMapUnit_m;
     disc_ = std::llround(0.25 * radius * radius);
     table_.resize(kInitialTable);
-    for (auto reserve : {kInitialTable / 2}) {
-        moments_.reserve(reserve);
-        planes_.reserve(reserve);
-        fitted_.reserve(reserve);
-        free_.reserve(reserve);
-    }
+    blocks_.reserve(kInitialTable / 2);
+    free_blocks_.reserve(kInitialTable / 2);
+    moments_.reserve(kInitialVoxels);
+    planes_.reserve(kInitialVoxels);
+    fitted_.reserve(kInitialVoxels);
+    free_.reserve(kInitialVoxels);
 }
 
 void VoxelMap::clear() {
     std::fill(table_.begin(), table_.end(), Entry{});
+    blocks_.clear();
+    free_blocks_.clear();
+    block_count_ = 0;
+    last_key_ = kEmpty;
     moments_.clear();
     planes_.clear();
     fitted_.clear();
@@ -45,31 +49,37 @@ VoxelIndex VoxelMap::index_of(const FixedPoint& p) const {
     return {floor_divide(p.x, side_), floor_divide(p.y, side_), floor_divide(p.z, side_)};
 }
 
-std::uint64_t VoxelMap::key_of(VoxelIndex i) {
-    constexpr std::uint64_t kMask = (std::uint64_t{1} << 21) - 1;
-    return ((static_cast<std::uint64_t>(static_cast<std::uint32_t>(i.x)) & kMask) << 42) |
-           ((static_cast<std::uint64_t>(static_cast<std::uint32_t>(i.y)) & kMask) << 21) |
-           (static_cast<std::uint64_t>(static_cast<std::uint32_t>(i.z)) & kMask);
+std::uint32_t VoxelMap::make_block(std::uint64_t key) {
+    if (2 * (block_count_ + 1) > table_.size()) grow();
+    std::uint32_t block;
+    if (free_blocks_.empty()) {
+        block = static_cast<std::uint32_t>(blocks_.size());
+        blocks_.emplace_back();
+    } else {
+        block = free_blocks_.back();
+        free_blocks_.pop_back();
+    }
+    blocks_[block].slot.fill(kNone);
+    blocks_[block].occupied = 0;
+    table_[locate(key)] = {key, block};
+    ++block_count_;
+    last_key_ = key;
+    last_block_ = block;
+    return block;
 }
 
-std::size_t VoxelMap::home_of(std::uint64_t key) const {
-    const int bits = std::countr_zero(table_.size());
-    return static_cast<std::size_t>((key * 0x9E3779B97F4A7C15ULL) >> (64 - bits));
-}
-
-std::size_t VoxelMap::locate(std::uint64_t key) const {
-    const std::size_t mask = table_.size() - 1;
-    std::size_t i = home_of(key);
-    while (table_[i].key != key && table_[i].key != kEmpty) i = (i + 1) & mask;
-    return i;
-}
-
-const VoxelPlane* VoxelMap::find(VoxelIndex index) {
-    const Entry& entry = table_[locate(key_of(index))];
-    if (entry.key == kEmpty) return nullptr;
-    if (!fitted_[entry.slot]) fit(entry.slot);
-    const VoxelPlane& plane = planes_[entry.slot];
-    return plane.points >= static_cast<std::uint32_t>(config_.min_points) ? &plane : nullptr;
+std::uint32_t VoxelMap::make_voxel() {
+    ++voxel_count_;
+    if (free_.empty()) {
+        moments_.emplace_back();
+        planes_.emplace_back();
+        fitted_.push_back(0);
+        return static_cast<std::uint32_t>(moments_.size() - 1);
+    }
+    const std::uint32_t slot = free_.back();
+    free_.pop_back();
+    moments_[slot] = Moments{};
+    return slot;
 }
 
 void VoxelMap::accumulate(std::span<const FixedPoint> points, int sign) {
@@ -77,27 +87,14 @@ void VoxelMap::accumulate(std::span<const FixedPoint> points, int sign) {
     for (const FixedPoint& p : points) {
         const VoxelIndex index = index_of(p);
         const std::uint64_t key = key_of(index);
-        std::size_t entry = locate(key);
-        if (table_[entry].key == kEmpty) {
-            if (2 * (voxel_count_ + 1) > table_.size()) {
-                grow();
-                entry = locate(key);
-            }
-            std::uint32_t slot;
-            if (free_.empty()) {
-                slot = static_cast<std::uint32_t>(moments_.size());
-                moments_.emplace_back();
-                planes_.emplace_back();
-                fitted_.push_back(0);
-            } else {
-                slot = free_.back();
-                free_.pop_back();
-                moments_[slot] = Moments{};
-            }
-            table_[entry] = {key, slot};
-            ++voxel_count_;
+        std::uint32_t block = block_of(key);
+        if (block == kNone) block = make_block(key);
+        const std::size_t position = position_in_block(index);
+        std::uint32_t& slot = blocks_[block].slot[position];
+        if (slot == kNone) {
+            slot = make_voxel();
+            blocks_[block].occupied |= std::uint64_t{1} << position;
         }
-        const std::uint32_t slot = table_[entry].slot;
         Moments& m = moments_[slot];
         const std::int64_t d[3] = {p.x - (std::int64_t{index.x} * side_ + side_ / 2),
                                    p.y - (std::int64_t{index.y} * side_ + side_ / 2),
@@ -115,15 +112,19 @@ void VoxelMap::accumulate(std::span<const FixedPoint> points, int sign) {
         fitted_[slot] = 0;
         if (m.count == 0) {
             free_.push_back(slot);
-            erase(entry);
+            slot = kNone;
+            --voxel_count_;
+            blocks_[block].occupied &= ~(std::uint64_t{1} << position);
+            if (blocks_[block].occupied == 0) erase_block(key);
         }
     }
 }
 
-void VoxelMap::erase(std::size_t entry) {
+void VoxelMap::erase_block(std::uint64_t key) {
     // Entries that were pushed along by this one move back, so that no search ends early.
     const std::size_t mask = table_.size() - 1;
-    std::size_t hole = entry;
+    std::size_t hole = locate(key);
+    free_blocks_.push_back(table_[hole].block);
     std::size_t next = (hole + 1) & mask;
     while (table_[next].key != kEmpty) {
         const std::size_t home = home_of(table_[next].key);
@@ -134,7 +135,8 @@ void VoxelMap::erase(std::size_t entry) {
         next = (next + 1) & mask;
     }
     table_[hole] = Entry{};
-    --voxel_count_;
+    --block_count_;
+    last_key_ = kEmpty;
 }
 
 void VoxelMap::grow() {

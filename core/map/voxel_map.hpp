@@ -1,11 +1,14 @@
-// The local map: a hash of voxels, each holding the moments of the surface elements inside it.
+// The local map: voxels that hold the moments of the surface elements inside them, in a hash of blocks of 4 x 4 x 4
+// voxels: neighbours share a block, so that points of a scan line find theirs without a new search.
 //
 // Moments are integers in fixed point, so that adding and removing points is exact and independent of their order: a
 // keyframe that leaves takes away precisely what it brought. A voxel's plane is fitted when it is first asked for.
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -49,7 +52,7 @@ struct VoxelIndex {
 };
 
 /// What the registration needs of a voxel, relative to the voxel's centre, metres.
-struct VoxelPlane {
+struct alignas(64) VoxelPlane {
     float mean[3];
     float normal[3];
     float thickness_m;  ///< standard deviation along the normal, at least the configured floor
@@ -71,6 +74,10 @@ class VoxelMap {
     /// The voxel's plane, nullptr where it holds too few points. Fits it if needed.
     const VoxelPlane* find(VoxelIndex index);
 
+    /// Calls f(index, plane) for each voxel with enough points in the 3 x 3 x 3 around `center`.
+    template <class F>
+    void for_each_around(VoxelIndex center, F&& f);
+
     VoxelIndex index_of(const FixedPoint& p) const;
     /// Side of a voxel as it is used: a whole number of kMapUnit_m.
     double voxel_m() const { return static_cast<double>(side_) * kMapUnit_m; }
@@ -82,17 +89,28 @@ class VoxelMap {
         std::array<std::int32_t, 3> sum{};     ///< of positions relative to the voxel's centre
         std::array<std::int64_t, 6> square{};  ///< xx, xy, xz, yy, yz, zz, with the discs' own
     };
+    static constexpr std::uint32_t kNone = ~std::uint32_t{0};
+    static constexpr std::uint64_t kEmpty = ~std::uint64_t{0};
+    static constexpr int kBlockBits = 2;  ///< a block has 2^kBlockBits voxels a side
+    static constexpr std::size_t kBlockVoxels = std::size_t{1} << (3 * kBlockBits);
     struct Entry {
         std::uint64_t key = kEmpty;
-        std::uint32_t slot = 0;
+        std::uint32_t block = kNone;
     };
-    static constexpr std::uint64_t kEmpty = ~std::uint64_t{0};
+    struct Block {
+        std::array<std::uint32_t, kBlockVoxels> slot;  ///< by voxel, kNone where it is empty
+        std::uint64_t occupied = 0;                    ///< bit by voxel
+    };
 
     static std::uint64_t key_of(VoxelIndex index);
+    static std::size_t position_in_block(VoxelIndex index);
     std::size_t home_of(std::uint64_t key) const;
-    void accumulate(std::span<const FixedPoint> points, int sign);
     std::size_t locate(std::uint64_t key) const;  ///< entry of the key, or the empty entry where it would go
-    void erase(std::size_t entry);
+    std::uint32_t block_of(std::uint64_t key);    ///< kNone where there is none
+    std::uint32_t make_block(std::uint64_t key);
+    std::uint32_t make_voxel();
+    void accumulate(std::span<const FixedPoint> points, int sign);
+    void erase_block(std::uint64_t key);
     void grow();
     void fit(std::uint32_t slot);
 
@@ -100,11 +118,92 @@ class VoxelMap {
     std::int32_t side_;
     std::int64_t disc_;         ///< variance of a disc along its plane, fixed point squared
     std::vector<Entry> table_;  ///< open addressing, linear probing, a power of two long
-    std::vector<Moments> moments_;
-    std::vector<VoxelPlane> planes_;
-    std::vector<std::uint8_t> fitted_;
-    std::vector<std::uint32_t> free_;
+    std::vector<Block> blocks_;
+    std::vector<std::uint32_t> free_blocks_;
+    std::size_t block_count_ = 0;
+    std::uint64_t last_key_ = kEmpty;  ///< of the block that was asked for last
+    std::uint32_t last_block_ = kNone;
+    std::vector<Moments> moments_;      ///< by slot
+    std::vector<VoxelPlane> planes_;    ///< by slot
+    std::vector<std::uint8_t> fitted_;  ///< by slot
+    std::vector<std::uint32_t> free_;   ///< slots
     std::size_t voxel_count_ = 0;
 };
+
+inline std::uint64_t VoxelMap::key_of(VoxelIndex i) {
+    constexpr std::uint64_t kMask = (std::uint64_t{1} << 21) - 1;
+    const auto part = [&](std::int32_t v) {
+        return static_cast<std::uint64_t>(static_cast<std::uint32_t>(v >> kBlockBits)) & kMask;
+    };
+    return (part(i.x) << 42) | (part(i.y) << 21) | part(i.z);
+}
+
+inline std::size_t VoxelMap::position_in_block(VoxelIndex i) {
+    constexpr std::uint32_t kMask = (1U << kBlockBits) - 1;
+    const auto part = [&](std::int32_t v) { return static_cast<std::size_t>(static_cast<std::uint32_t>(v) & kMask); };
+    return (part(i.z) << (2 * kBlockBits)) | (part(i.y) << kBlockBits) | part(i.x);
+}
+
+inline std::size_t VoxelMap::home_of(std::uint64_t key) const {
+    const int bits = std::countr_zero(table_.size());
+    return static_cast<std::size_t>((key * 0x9E3779B97F4A7C15ULL) >> (64 - bits));
+}
+
+inline std::size_t VoxelMap::locate(std::uint64_t key) const {
+    const std::size_t mask = table_.size() - 1;
+    std::size_t i = home_of(key);
+    while (table_[i].key != key && table_[i].key != kEmpty) i = (i + 1) & mask;
+    return i;
+}
+
+inline std::uint32_t VoxelMap::block_of(std::uint64_t key) {
+    if (key != last_key_) {
+        last_key_ = key;
+        last_block_ = table_[locate(key)].block;
+    }
+    return last_block_;
+}
+
+inline const VoxelPlane* VoxelMap::find(VoxelIndex index) {
+    const std::uint32_t block = block_of(key_of(index));
+    if (block == kNone) return nullptr;
+    const std::uint32_t slot = blocks_[block].slot[position_in_block(index)];
+    if (slot == kNone) return nullptr;
+    if (!fitted_[slot]) fit(slot);
+    const VoxelPlane& plane = planes_[slot];
+    return plane.points >= static_cast<std::uint32_t>(config_.min_points) ? &plane : nullptr;
+}
+
+template <class F>
+void VoxelMap::for_each_around(VoxelIndex center, F&& f) {
+    constexpr int kSide = 1 << kBlockBits;
+    static_assert(kSide == 4, "the masks below are for 64 voxels a block");
+    // Bits of the voxels in a block whose coordinate along one axis lies in [low, high].
+    const auto layers = [](int low, int high, int stride, std::uint64_t layer) {
+        std::uint64_t mask = 0;
+        for (int i = std::max(low, 0); i <= std::min(high, kSide - 1); ++i) mask |= layer << (i * stride);
+        return mask;
+    };
+    for (int bz = (center.z - 1) >> kBlockBits; bz <= (center.z + 1) >> kBlockBits; ++bz) {
+        const std::uint64_t in_z = layers(center.z - 1 - bz * kSide, center.z + 1 - bz * kSide, 16, 0xFFFFULL);
+        for (int by = (center.y - 1) >> kBlockBits; by <= (center.y + 1) >> kBlockBits; ++by) {
+            const std::uint64_t in_y =
+                in_z & layers(center.y - 1 - by * kSide, center.y + 1 - by * kSide, 4, 0x000F000F000F000FULL);
+            for (int bx = (center.x - 1) >> kBlockBits; bx <= (center.x + 1) >> kBlockBits; ++bx) {
+                const std::uint32_t block = block_of(key_of({bx * kSide, by * kSide, bz * kSide}));
+                if (block == kNone) continue;
+                std::uint64_t left =
+                    blocks_[block].occupied & in_y &
+                    layers(center.x - 1 - bx * kSide, center.x + 1 - bx * kSide, 1, 0x1111111111111111ULL);
+                for (; left != 0; left &= left - 1) {
+                    const int bit = std::countr_zero(left);
+                    const VoxelIndex index{bx * kSide + (bit & 3), by * kSide + ((bit >> 2) & 3),
+                                           bz * kSide + (bit >> 4)};
+                    if (const VoxelPlane* plane = find(index)) f(index, *plane);
+                }
+            }
+        }
+    }
+}
 
 }  // namespace dlod

@@ -18,22 +18,22 @@ void invert_ranges(const std::uint32_t* __restrict range_mm, float* __restrict i
     }
 }
 
-/// Sums over the five rows and columns of all windows of a row.
+/// Sums over the pixels of all windows of a row; pixels[k][i] is pixel k of window i.
 DLOD_MULTIVERSION
-void fit_windows(const float* const* __restrict rows, const float (*__restrict weight)[kWindowPixels],
+void fit_windows(const float* const* __restrict pixels, const float (*__restrict weight)[kWindowPixels],
                  const float* __restrict scale, const float* __restrict azimuth, const float* __restrict altitude,
-                 int width, float* __restrict inverse, float* __restrict slope_azimuth,
+                 int count, float* __restrict inverse, float* __restrict slope_azimuth,
                  float* __restrict slope_altitude, float* __restrict deviation) {
     constexpr int kBlock = 64;
     float a[kBlock], b[kBlock], g[kBlock], low[kBlock], squares[kBlock];
-    for (int start = 0; start < width; start += kBlock) {
-        const int n = std::min(kBlock, width - start);
+    for (int start = 0; start < count; start += kBlock) {
+        const int n = std::min(kBlock, count - start);
         for (int c = 0; c < kBlock; ++c) {
             a[c] = b[c] = g[c] = squares[c] = 0.0F;
             low[c] = 1e9F;
         }
         for (int k = 0; k < kWindowPixels; ++k) {
-            const float* __restrict f = rows[k / kWindowSide] + start + k % kWindowSide;
+            const float* __restrict f = pixels[k] + start;
             const float wa = weight[0][k];
             const float wb = weight[1][k];
             const float wg = weight[2][k];
@@ -45,7 +45,7 @@ void fit_windows(const float* const* __restrict rows, const float (*__restrict w
             }
         }
         for (int k = 0; k < kWindowPixels; ++k) {
-            const float* __restrict f = rows[k / kWindowSide] + start + k % kWindowSide;
+            const float* __restrict f = pixels[k] + start;
             const float s = scale[k];
             const float u = azimuth[k];
             const float v = altitude[k];
@@ -68,12 +68,18 @@ void fit_windows(const float* const* __restrict rows, const float (*__restrict w
 
 }  // namespace
 
-PlaneWindows::PlaneWindows(const SensorModel& sensor)
-    : sensor_(sensor), R_sensor_lidar_(sensor.T_sensor_lidar.rotation().cast<float>()) {
+PlaneWindows::PlaneWindows(const SensorModel& sensor, int column_step)
+    : sensor_(sensor),
+      column_step_(column_step),
+      windows_(sensor.width / column_step),
+      R_sensor_lidar_(sensor.T_sensor_lidar.rotation().cast<float>()) {
     const int h = sensor.height;
     const int w = sensor.width;
     const double per_column = 2.0 * std::numbers::pi / w;
-    inverse_.resize(h, w + 2 * kWindowRadius);
+    // One value before the image and two after it at most: a window reaches kWindowRadius columns to either side.
+    stride_ = static_cast<std::size_t>(windows_ + 2 * kWindowRadius);
+    inverse_.assign(static_cast<std::size_t>(h) * static_cast<std::size_t>(column_step) * stride_, 0.0F);
+    row_.resize(static_cast<std::size_t>(w));
     for (int m = 0; m < w; ++m) {
         const double theta = 2.0 * std::numbers::pi - per_column * m;
         cos_azimuth_.push_back(static_cast<float>(std::cos(theta)));
@@ -115,17 +121,17 @@ PlaneWindows::PlaneWindows(const SensorModel& sensor)
             }
         }
         auto& usable = usable_[static_cast<std::size_t>(row)];
-        usable.assign(static_cast<std::size_t>(w), h >= kWindowSide ? 1 : 0);
-        for (int c = 0; c < w; ++c) {
+        usable.assign(static_cast<std::size_t>(windows_), h >= kWindowSide ? 1 : 0);
+        for (int i = 0; i < windows_; ++i) {
             int low = w;
             int high = -1;
             for (int k = 0; k < kWindowPixels; ++k) {
-                const int column = (c + k % kWindowSide - kWindowRadius + w) % w;
+                const int column = (i * column_step + k % kWindowSide - kWindowRadius + w) % w;
                 const int m = sensor.measurement_of(std::min(model.first_row + k / kWindowSide, h - 1), column);
                 low = std::min(low, m);
                 high = std::max(high, m);
             }
-            if (high - low > w / 2) usable[static_cast<std::size_t>(c)] = 0;
+            if (high - low > w / 2) usable[static_cast<std::size_t>(i)] = 0;
         }
     }
 }
@@ -133,29 +139,40 @@ PlaneWindows::PlaneWindows(const SensorModel& sensor)
 void PlaneWindows::load(const Frame& frame) {
     const int w = sensor_.width;
     for (int r = 0; r < sensor_.height; ++r) {
-        float* row = inverse_.row(r);
-        invert_ranges(frame.raw.range_mm.row(r), row + kWindowRadius, w, sensor_.beam_origin_m);
-        for (int k = 0; k < kWindowRadius; ++k) {
-            row[k] = row[w + k];
-            row[w + kWindowRadius + k] = row[kWindowRadius + k];
+        invert_ranges(frame.raw.range_mm.row(r), row_.data(), w, sensor_.beam_origin_m);
+        for (int p = 0; p < column_step_; ++p) {
+            float* part = part_of(r, p);
+            for (int i = 0; i < windows_; ++i)
+                part[kWindowRadius + i] = row_[static_cast<std::size_t>(i * column_step_ + p)];
+            for (int i = 1; i <= kWindowRadius; ++i) {
+                const int before = ((p - i * column_step_) % w + w) % w;
+                const int after = (p + (windows_ - 1 + i) * column_step_) % w;
+                part[kWindowRadius - i] = row_[static_cast<std::size_t>(before)];
+                part[kWindowRadius + windows_ - 1 + i] = row_[static_cast<std::size_t>(after)];
+            }
         }
     }
 }
 
 void PlaneWindows::fit_row(int row, PlaneRow& planes) const {
-    const int w = sensor_.width;
-    const auto count = static_cast<std::size_t>(w);
+    const auto count = static_cast<std::size_t>(windows_);
     for (auto* values : {&planes.inverse_range, &planes.slope_azimuth, &planes.slope_altitude, &planes.deviation_m}) {
         values->resize(count);
     }
     const RowModel& model = model_[static_cast<std::size_t>(row)];
-    const float* rows[kWindowSide];
-    for (int i = 0; i < kWindowSide; ++i) rows[i] = inverse_.row(std::min(model.first_row + i, sensor_.height - 1));
-    fit_windows(rows, model.weight, model.scale, model.azimuth, model.altitude, w, planes.inverse_range.data(),
+    const float* pixels[kWindowPixels];
+    for (int k = 0; k < kWindowPixels; ++k) {
+        const int offset = k % kWindowSide - kWindowRadius;
+        const int turns = offset >= 0 ? offset / column_step_ : -((column_step_ - 1 - offset) / column_step_);
+        const int part = offset - turns * column_step_;
+        pixels[k] =
+            part_of(std::min(model.first_row + k / kWindowSide, sensor_.height - 1), part) + kWindowRadius + turns;
+    }
+    fit_windows(pixels, model.weight, model.scale, model.azimuth, model.altitude, windows_, planes.inverse_range.data(),
                 planes.slope_azimuth.data(), planes.slope_altitude.data(), planes.deviation_m.data());
     const auto& usable = usable_[static_cast<std::size_t>(row)];
-    for (std::size_t c = 0; c < count; ++c) {
-        if (!usable[c]) planes.inverse_range[c] = 0.0F;
+    for (std::size_t i = 0; i < count; ++i) {
+        if (!usable[i]) planes.inverse_range[i] = 0.0F;
     }
 }
 

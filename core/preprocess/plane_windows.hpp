@@ -16,13 +16,13 @@ inline constexpr int kWindowRadius = 2;
 inline constexpr int kWindowSide = 2 * kWindowRadius + 1;
 inline constexpr int kWindowPixels = kWindowSide * kWindowSide;
 
-/// The planes around all pixels of one row. A window with a missing pixel, or with pixels a turn apart in time (the
-/// seam), has inverse range 0.
+/// The planes around every column_step-th pixel of one row. A window with a missing pixel, or with pixels a turn apart
+/// in time (the seam), has inverse range 0.
 struct PlaneRow {
-    AlignedVector<float> inverse_range;  ///< [W] smoothed, 1/m, from the beam's origin
-    AlignedVector<float> slope_azimuth;  ///< [W] derivative of the inverse range along the row, towards growing columns
-    AlignedVector<float> slope_altitude;  ///< [W] the same upwards
-    AlignedVector<float> deviation_m;     ///< [W] root mean square deviation of the ranges from the plane
+    AlignedVector<float> inverse_range;   ///< [W / column_step] smoothed, 1/m, from the beam's origin
+    AlignedVector<float> slope_azimuth;   ///< derivative of the inverse range along the row, towards growing columns
+    AlignedVector<float> slope_altitude;  ///< the same upwards
+    AlignedVector<float> deviation_m;     ///< root mean square deviation of the ranges from the plane
 };
 
 /// A beam's direction and its two tangents, sensor frame.
@@ -32,14 +32,18 @@ struct BeamFrame {
 
 class PlaneWindows {
   public:
-    explicit PlaneWindows(const SensorModel& sensor);
+    PlaneWindows(const SensorModel& sensor, int column_step);
 
     /// Inverse ranges of the whole image, from the raw ranges; call it first for each frame.
     void load(const Frame& frame);
     /// Fits all windows whose centre lies in `row`.
     void fit_row(int row, PlaneRow& planes) const;
-    /// Inverse range of one pixel from its beam's origin, 0 without return.
-    float inverse_range(int row, int column) const { return inverse_.row(row)[column + kWindowRadius]; }
+    /// Number of windows in a row; the centre of window k is column k * column_step.
+    int windows() const { return windows_; }
+    /// Distance from the beam's origin, metres.
+    float distance(std::uint32_t range_mm) const {
+        return static_cast<float>(range_mm) * 1e-3F - sensor_.beam_origin_m;
+    }
     BeamFrame beam(int row, int column) const;
 
   private:
@@ -56,10 +60,24 @@ class PlaneWindows {
         float sin_offset = 0.0F;
     };
 
+    float* part_of(int row, int part) {
+        return inverse_.data() + (static_cast<std::size_t>(row) * static_cast<std::size_t>(column_step_) +
+                                  static_cast<std::size_t>(part)) *
+                                     stride_;
+    }
+    const float* part_of(int row, int part) const { return const_cast<PlaneWindows*>(this)->part_of(row, part); }
+
     SensorModel sensor_;
-    std::vector<RowModel> model_;                     ///< by row
-    Image<float> inverse_;                            ///< padded by kWindowRadius columns on both sides, wrapped
-    std::vector<std::vector<std::uint8_t>> usable_;   ///< by row: 1 where the window does not straddle the seam
+    std::vector<RowModel> model_;  ///< by row
+    int column_step_;
+    int windows_;
+    /// Inverse ranges, wrapped around the image's edge. A row holds column_step parts of stride_ values: part p is
+    /// columns p, p + column_step, ..., after one that lies before the image, so that windows of a row are read without
+    /// gaps.
+    AlignedVector<float> inverse_;
+    std::size_t stride_;
+    std::vector<float> row_;                          ///< scratch: inverse ranges of a row in their order
+    std::vector<std::vector<std::uint8_t>> usable_;   ///< by row and window: 1 where it does not straddle the seam
     AlignedVector<float> cos_azimuth_, sin_azimuth_;  ///< by measurement: encoder angle
     Eigen::Matrix3f R_sensor_lidar_;
 };

@@ -35,13 +35,12 @@ int fair_share(const std::array<int, N>& counts, int budget) {
 }  // namespace
 
 Subsampling::Subsampling(const SensorModel& sensor, const SubsamplingConfig& config)
-    : sensor_(sensor), config_(config), windows_(sensor) {
+    : sensor_(sensor), config_(config), windows_(sensor, std::clamp(config.column_step, 1, sensor.width)) {
     const int rows = std::clamp(config.rows, 1, sensor.height);
     for (int i = 0; i < rows; ++i) candidate_rows_.push_back((2 * i + 1) * sensor.height / (2 * rows));
-    const auto per_row = static_cast<std::size_t>(sensor.width / config.column_step + 1);
-    flat_.reserve(static_cast<std::size_t>(rows) * per_row);
-    rough_.reserve(static_cast<std::size_t>(rows) *
-                   static_cast<std::size_t>(sensor.width / config.rough_column_step + 1));
+    const auto most = static_cast<std::size_t>(rows) * static_cast<std::size_t>(windows_.windows());
+    flat_.reserve(most);
+    rough_.reserve(most);
 }
 
 void Subsampling::process(Frame& frame) {
@@ -62,20 +61,22 @@ void Subsampling::collect_row(const Frame& frame, int row) {
     // Columns per spacing at one metre of range.
     const auto columns_at_1m = static_cast<float>(config_.spacing_m * w / (2.0 * std::numbers::pi));
     const float* range = frame.cloud.range_m.row(row);
+    const std::uint32_t* raw = frame.raw.range_mm.row(row);
     const float* x = frame.cloud.x.row(row);
     const float* y = frame.cloud.y.row(row);
     const float* z = frame.cloud.z.row(row);
     const int first = row * w;
-    for (int c = 0; c < w; c += config_.column_step) {
+    for (int k = 0; k < windows_.windows(); ++k) {
+        const int c = k * config_.column_step;
         if (range[c] < min_range) continue;
         if (std::max({std::abs(x[c]), std::abs(y[c]), std::abs(z[c])}) < crop) continue;
-        const auto i = static_cast<std::size_t>(c);
+        const auto i = static_cast<std::size_t>(k);
         const float inverse = planes_.inverse_range[i];
         if (inverse > 0.0F && planes_.deviation_m[i] <= max_deviation) {
             // Power of two, so that the thinned grid of neighbouring ranges shares its columns.
-            int step = config_.column_step;
-            while (static_cast<float>(2 * step) <= columns_at_1m * inverse) step *= 2;
-            if (c % step != 0) continue;
+            int step = 1;
+            while (static_cast<float>(2 * step * config_.column_step) <= columns_at_1m * inverse) step *= 2;
+            if (k % step != 0) continue;
             const float b = planes_.slope_azimuth[i];
             const float g = planes_.slope_altitude[i];
             const float length = std::sqrt(inverse * inverse + b * b + g * g);
@@ -84,12 +85,12 @@ void Subsampling::collect_row(const Frame& frame, int row) {
                 const Eigen::Vector3f normal = -(inverse * beam.direction + b * beam.along_row + g * beam.up) / length;
                 const float ratio = planes_.deviation_m[i] / max_deviation;
                 flat_.push_back({static_cast<PixelIndex>(first + c), direction_bin(normal),
-                                 1.0F / inverse - 1.0F / windows_.inverse_range(row, c), 1.0F - 0.9F * ratio * ratio,
-                                 normal.x(), normal.y(), normal.z()});
+                                 1.0F / inverse - windows_.distance(raw[c]), 1.0F - 0.9F * ratio * ratio, normal.x(),
+                                 normal.y(), normal.z()});
                 continue;
             }
         }
-        if (c % config_.rough_column_step == 0) rough_.push_back(static_cast<PixelIndex>(first + c));
+        if (k % config_.rough_step == 0) rough_.push_back(static_cast<PixelIndex>(first + c));
     }
 }
 

@@ -9,9 +9,9 @@
 namespace dlod {
 
 struct SubsamplingConfig {
-    int rows = 32;
-    int column_step = 2;
-    int rough_column_step = 4;
+    int rows = 43;
+    int column_step = 4;
+    int rough_step = 1;
     int points = 4000;
     double spacing_m = 0.12;
     double min_range_m = 0.5;
@@ -24,8 +24,8 @@ struct SubsamplingConfig {
         v.parameter("rows", rows, Range{4, 512}, "rows",
                     "rows of the image that are candidates; more is slower, more accurate");
         v.parameter("column_step", column_step, Range{1, 64}, "columns", "every n-th column is a candidate");
-        v.parameter("rough_column_step", rough_column_step, Range{1, 64}, "columns",
-                    "every n-th column of what is not flat; lower sees smaller moving objects");
+        v.parameter("rough_step", rough_step, Range{1, 16}, "candidates",
+                    "every n-th candidate of what is not flat; lower sees smaller moving objects");
         v.parameter("points", points, Range{200, 50000}, "points",
                     "flat points kept, evened out over the directions of their normals");
         v.parameter("spacing_m", spacing_m, Range{0.0, 5.0}, "m",

@@ -38,18 +38,12 @@ float distance_to(const VoxelPlane& plane, const float offset[3]) {
 /// The nearest of the Gaussians in the 26 voxels around an empty one.
 float distance_to_neighbours(VoxelMap& map, const Cell& cell, float side, float cap) {
     float nearest = cap;
-    for (int dx = -1; dx <= 1; ++dx) {
-        for (int dy = -1; dy <= 1; ++dy) {
-            for (int dz = -1; dz <= 1; ++dz) {
-                const VoxelPlane* plane = map.find({cell.index.x + dx, cell.index.y + dy, cell.index.z + dz});
-                if (plane == nullptr) continue;
-                const float offset[3] = {cell.offset[0] - static_cast<float>(dx) * side,
-                                         cell.offset[1] - static_cast<float>(dy) * side,
-                                         cell.offset[2] - static_cast<float>(dz) * side};
-                nearest = std::min(nearest, distance_to(*plane, offset));
-            }
-        }
-    }
+    map.for_each_around(cell.index, [&](VoxelIndex index, const VoxelPlane& plane) {
+        const float offset[3] = {cell.offset[0] - static_cast<float>(index.x - cell.index.x) * side,
+                                 cell.offset[1] - static_cast<float>(index.y - cell.index.y) * side,
+                                 cell.offset[2] - static_cast<float>(index.z - cell.index.z) * side};
+        nearest = std::min(nearest, distance_to(plane, offset));
+    });
     return nearest;
 }
 
