@@ -14,6 +14,9 @@ namespace {
 /// Damaged captures have times that nanoseconds in 64 bits cannot hold.
 constexpr std::int64_t kLatestSecond = std::int64_t{1} << 32;
 
+/// Records from one look at the file position to the next.
+constexpr std::uint64_t kProgressRecords = 64;
+
 std::string link_type_name(int link_type) {
     const char* name = pcap_datalink_val_to_name(link_type);
     return std::to_string(link_type) + (name != nullptr ? std::string(" (") + name + ")" : "");
@@ -53,6 +56,7 @@ PacketBatch PcapSource::next() {
         const int result = pcap_next_ex(pcap_.get(), &header, &bytes);
         if (result != 1) return finish(result);
         ++counters_.records;
+        if (counters_.records.value() % kProgressRecords == 0) note_progress();
         // Nanosecond precision was asked for: tv_usec has nanoseconds.
         const std::int64_t seconds = std::clamp<std::int64_t>(header->ts.tv_sec, 0, kLatestSecond);
         const std::int64_t time_ns = seconds * 1'000'000'000 + header->ts.tv_usec;
@@ -66,6 +70,7 @@ PacketBatch PcapSource::next() {
 
 PacketBatch PcapSource::finish(int result) {
     ended_ = true;
+    bytes_read_.set(file_size_);
     reassembly_.finish();
     if (result == PCAP_ERROR) {
         ++counters_.unreadable;
@@ -159,10 +164,14 @@ bool PcapSource::checksum_accepted(UdpChecksum checksum, bool reassembled) {
     return true;
 }
 
+void PcapSource::note_progress() {
+    const off_t at = ::ftello(pcap_file(pcap_.get()));
+    if (at > 0) bytes_read_.set(static_cast<std::uint64_t>(at));
+}
+
 double PcapSource::progress() const {
-    if (ended_ || file_size_ == 0) return 1.0;
-    const off_t at = ftello(pcap_file(pcap_.get()));
-    return at < 0 ? 0.0 : std::min(1.0, static_cast<double>(at) / static_cast<double>(file_size_));
+    if (file_size_ == 0) return 0.0;
+    return std::min(1.0, static_cast<double>(bytes_read_.value()) / static_cast<double>(file_size_));
 }
 
 void PcapSource::visit_counters(const CounterVisitor& visit) const {

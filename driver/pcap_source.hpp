@@ -51,7 +51,7 @@ class PcapSource final : public PacketSource {
     const PcapCounters& counters() const { return counters_; }
     const ReassemblyCounters& reassembly_counters() const { return reassembly_.counters(); }
 
-    /// Share of the file that was read, 0 to 1.
+    /// Share of the file that was read, 0 to 1. From any thread.
     double progress() const;
 
   private:
@@ -59,6 +59,7 @@ class PcapSource final : public PacketSource {
     bool take_datagram(const IpPacket& ip, Bytes datagram, bool reassembled, std::int64_t time_ns);
     bool checksum_accepted(UdpChecksum checksum, bool reassembled);
     PacketBatch finish(int result);
+    void note_progress();
 
     std::filesystem::path path_;
     PcapOptions options_;
@@ -71,6 +72,7 @@ class PcapSource final : public PacketSource {
     IpReassembly reassembly_;
     Packet packet_;
     PcapCounters counters_;
+    Counter bytes_read_;  ///< of the file, brought up to date now and then
     std::atomic<bool> stopped_{false};
 };
 

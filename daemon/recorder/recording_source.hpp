@@ -1,0 +1,85 @@
+// Records what passes from a source to the pipeline, without holding it up.
+#pragma once
+
+#include "core/types/parameter.hpp"
+#include "driver/capture_rotation.hpp"
+#include "driver/packet_source.hpp"
+
+#include <boost/lockfree/spsc_queue.hpp>
+
+#include <atomic>
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace dlod::daemon {
+
+struct RecordingConfig {
+    std::string folder;
+    int file_megabytes = 1000;
+    int files = 10;
+    int buffer_megabytes = 32;
+
+    template <class V>
+    void visit(V& v) {
+        v.text("folder", folder, "where received packets are recorded as captures (pcap) that can be replayed; empty: nowhere");
+        v.parameter("file_megabytes", file_megabytes, Range{1, 1'000'000}, "MB", "size at which a new file is begun");
+        v.parameter("files", files, Range{1, 100'000}, "files", "files kept at most; the oldest is removed");
+        v.parameter("buffer_megabytes", buffer_megabytes, Range{1, 4096}, "MB",
+                    "packets that may wait for a slow disk; beyond, packets are left out of the recording, never out of the odometry");
+    }
+};
+
+/// Hands on another source's batches and copies them to a thread that writes them to disk. The copy is all that it costs
+/// the caller: when the disk is too slow or full, packets are missing from the recording, counted and reported.
+class RecordingSource final : public driver::PacketSource {
+  public:
+    /// `source` must outlive this. `metadata` is the sensor's, as it came.
+    RecordingSource(driver::PacketSource& source, const RecordingConfig& config, const std::string& metadata);
+    /// Writes what still waits, then closes the file.
+    ~RecordingSource() override;
+
+    driver::PacketBatch next() override;
+    void stop() noexcept override { source_.stop(); }
+    /// The source's and the recording's own.
+    void visit_counters(const driver::CounterVisitor& visit) const override;
+
+  private:
+    struct Header {
+        std::int64_t receive_ns = 0;
+        driver::IpAddress sender_address{};
+        std::uint16_t sender_port = 0;
+        std::uint16_t destination_port = 0;
+        std::uint32_t bytes = 0;
+    };
+
+    void enqueue(const driver::Packet& packet);
+    void write_until_stopped();
+    void write_waiting();
+    void report_trouble();
+
+    driver::PacketSource& source_;
+    driver::Counter recorded_;
+    driver::Counter buffer_full_;
+    driver::Counter write_failed_;
+
+    // The writing thread's.
+    driver::CaptureRotation rotation_;
+    std::vector<std::byte> datagram_;
+    std::optional<Header> header_;  // taken from the queue, its bytes not yet
+    bool in_trouble_ = false;
+
+    // Between the threads.
+    boost::lockfree::spsc_queue<std::byte> waiting_;
+    std::mutex mutex_;
+    std::condition_variable stop_requested_;
+    bool stopping_ = false;
+    std::string message_;
+    std::atomic<bool> message_waits_{false};
+    std::thread writer_;
+};
+
+}  // namespace dlod::daemon
