@@ -19,34 +19,32 @@ struct BatchParameters {
     float beam_origin;
     float tangent_low, entries_per_tangent;
     float columns_per_rad;
-    int width;
 };
 
-DLOD_MULTIVERSION void project_batch(const BatchParameters& parameters, int n, const float* __restrict x,
-                                     const float* __restrict y, const float* __restrict z,
-                                     const std::int32_t* __restrict row_of_tangent, const float* __restrict column_zero,
-                                     const float* __restrict column_per_inverse_m, const float* __restrict column_shift,
-                                     std::int32_t* __restrict pixel, float* __restrict range) {
+constexpr int kChunk = 256;  // points between the steps of a batch: small enough for the innermost cache
+
+/// Step 1: range, table entry of the elevation, column of the azimuth and inverse distance. No look-ups, so that it
+/// vectorises.
+DLOD_MULTIVERSION void locate(const BatchParameters& parameters, int n, const float* __restrict x,
+                              const float* __restrict y, const float* __restrict z, std::int32_t* __restrict entry,
+                              float* __restrict column, float* __restrict inverse_m, float* __restrict range) {
     const BatchParameters p = parameters;
-    const int last_entry = kTableSize - 1;
-    const auto width = static_cast<float>(p.width);
+    constexpr auto kLastEntry = static_cast<float>(kTableSize - 1);
     for (int i = 0; i < n; ++i) {
         const float lx = p.rotation[0] * x[i] + p.rotation[1] * y[i] + p.rotation[2] * z[i] + p.translation[0];
         const float ly = p.rotation[3] * x[i] + p.rotation[4] * y[i] + p.rotation[5] * z[i] + p.translation[1];
         const float lz = p.rotation[6] * x[i] + p.rotation[7] * y[i] + p.rotation[8] * z[i] + p.translation[2];
         const float squared = lx * lx + ly * ly;
         const float inverse = 1.0F / std::sqrt(squared > 1e-6F ? squared : 1e-6F);
-        const float distance = squared * inverse;
-        const float from_beam = distance - p.beam_origin;
+        const float from_beam = squared * inverse - p.beam_origin;
         const float tangent = lz / (from_beam > 1e-3F ? from_beam : 1e-3F);
-        float entry = (tangent - p.tangent_low) * p.entries_per_tangent;
-        entry = entry > 0.0F ? entry : 0.0F;
-        entry = entry < static_cast<float>(last_entry) ? entry : static_cast<float>(last_entry);
-        const std::int32_t row = row_of_tangent[static_cast<std::int32_t>(entry)];
-        const std::int32_t safe_row = row > 0 ? row : 0;
+        float place = (tangent - p.tangent_low) * p.entries_per_tangent;
+        place = place > 0.0F ? place : 0.0F;
+        place = place < kLastEntry ? place : kLastEntry;
+        entry[i] = static_cast<std::int32_t>(place);
         // Azimuth: a polynomial for the arc tangent of at most 1, then the octants; within 1e-5 rad.
-        const float ax = lx < 0.0F ? -lx : lx;
-        const float ay = ly < 0.0F ? -ly : ly;
+        const float ax = std::abs(lx);
+        const float ay = std::abs(ly);
         const float small = ax < ay ? ax : ay;
         const float large = ax < ay ? ay : ax;
         const float q = small / (large > 1e-6F ? large : 1e-6F);
@@ -57,19 +55,37 @@ DLOD_MULTIVERSION void project_batch(const BatchParameters& parameters, int n, c
         angle = ax < ay ? 1.57079633F - angle : angle;
         angle = lx < 0.0F ? 3.14159265F - angle : angle;
         angle = ly < 0.0F ? -angle : angle;
-        float column = column_zero[safe_row] + column_shift[safe_row] - p.columns_per_rad * angle +
-                       column_per_inverse_m[safe_row] * inverse + 0.5F;
-        column = column < 0.0F ? column + width : column;
-        column = column < 0.0F ? column + width : column;
-        column = column >= width ? column - width : column;
-        column = column >= width ? column - width : column;
-        std::int32_t whole = static_cast<std::int32_t>(column);
-        whole = whole < p.width ? whole : 0;
-        pixel[i] = row >= 0 ? row * p.width + whole : -1;
+        column[i] = 0.5F - p.columns_per_rad * angle;
+        inverse_m[i] = inverse;
         const float sx = lx - p.origin[0];
         const float sy = ly - p.origin[1];
         const float sz = lz - p.origin[2];
         range[i] = std::sqrt(sx * sx + sy * sy + sz * sz);
+    }
+}
+
+/// Step 2: rows from the table.
+DLOD_MULTIVERSION void look_up_rows(int n, const std::int32_t* __restrict entry,
+                                    const std::int32_t* __restrict row_of_tangent, std::int32_t* __restrict row) {
+    for (int i = 0; i < n; ++i) row[i] = row_of_tangent[entry[i]];
+}
+
+/// Step 3: the rows' own column offsets. The tables begin with an entry for row -1.
+DLOD_MULTIVERSION void finish_columns(int width, int n, const std::int32_t* __restrict row,
+                                      const float* __restrict column, const float* __restrict inverse_m,
+                                      const float* __restrict column_zero, const float* __restrict column_per_inverse_m,
+                                      const float* __restrict column_shift, std::int32_t* __restrict pixel) {
+    const auto turn = static_cast<float>(width);
+    for (int i = 0; i < n; ++i) {
+        float c = column[i] + column_zero[row[i] + 1] + column_shift[row[i] + 1] +
+                  column_per_inverse_m[row[i] + 1] * inverse_m[i];
+        c = c < 0.0F ? c + turn : c;
+        c = c < 0.0F ? c + turn : c;
+        c = c >= turn ? c - turn : c;
+        c = c >= turn ? c - turn : c;
+        std::int32_t whole = static_cast<std::int32_t>(c);
+        whole = whole < width ? whole : 0;
+        pixel[i] = row[i] >= 0 ? row[i] * width + whole : -1;
     }
 }
 
@@ -109,6 +125,8 @@ SensorProjection::SensorProjection(const SensorModel& sensor)
       beam_origin_m_(sensor.beam_origin_m) {
     const double columns_per_rad = sensor.width / (2.0 * std::numbers::pi);
     const auto rows = static_cast<std::size_t>(sensor.height);
+    column_zero_.push_back(0.0F);
+    column_per_inverse_m_.push_back(0.0F);
     for (std::size_t r = 0; r < rows; ++r) {
         // Beam azimuth theta + a with theta = 2 pi (1 - m / W), a = -azimuth_offset: solved for m and destaggered.
         const double a = -static_cast<double>(sensor.azimuth_offset_rad[r]);
@@ -116,7 +134,7 @@ SensorProjection::SensorProjection(const SensorModel& sensor)
         column_per_inverse_m_.push_back(
             static_cast<float>(-columns_per_rad * static_cast<double>(sensor.beam_origin_m) * std::sin(a)));
     }
-    no_shift_.assign(rows, 0.0F);
+    no_shift_.assign(rows + 1, 0.0F);
     const auto [low, high] = std::minmax_element(sensor.altitude_rad.begin(), sensor.altitude_rad.end());
     const double margin = rows > 1 ? 0.5 * static_cast<double>(*high - *low) / static_cast<double>(rows - 1) : 0.01;
     const double lowest = static_cast<double>(*low) - margin;
@@ -162,9 +180,18 @@ void SensorProjection::project(const Eigen::Isometry3f& T_sensor_points, int n, 
     parameters.tangent_low = tangent_low_;
     parameters.entries_per_tangent = entries_per_tangent_;
     parameters.columns_per_rad = static_cast<float>(width_ / (2.0 * std::numbers::pi));
-    parameters.width = width_;
-    project_batch(parameters, n, x, y, z, row_of_tangent_.data(), column_zero_.data(), column_per_inverse_m_.data(),
-                  column_shift != nullptr ? column_shift : no_shift_.data(), pixel, range_m);
+    const float* shift = column_shift != nullptr ? column_shift : no_shift_.data();
+    std::int32_t entry[kChunk];
+    std::int32_t row[kChunk];
+    float column[kChunk];
+    float inverse_m[kChunk];
+    for (int begin = 0; begin < n; begin += kChunk) {
+        const int count = std::min(kChunk, n - begin);
+        locate(parameters, count, x + begin, y + begin, z + begin, entry, column, inverse_m, range_m + begin);
+        look_up_rows(count, entry, row_of_tangent_.data(), row);
+        finish_columns(width_, count, row, column, inverse_m, column_zero_.data(), column_per_inverse_m_.data(), shift,
+                       pixel + begin);
+    }
 }
 
 }  // namespace dlod

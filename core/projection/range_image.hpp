@@ -60,7 +60,7 @@ class SensorProjection {
     /// Projects n points p by T_sensor_points: `pixel` gets row * width + column, -1 outside the image; `range_m` the
     /// distance from the sensor's origin. Faster than project() and the same but for points within 1e-3 pixels of an
     /// edge.
-    /// @param column_shift [height] added to the column of each row, or nullptr
+    /// @param column_shift [1 + height] added to the column of each row, from the second entry on, or nullptr
     void project(const Eigen::Isometry3f& T_sensor_points, int n, const float* x, const float* y, const float* z,
                  const float* column_shift, std::int32_t* pixel, float* range_m) const;
 
@@ -75,9 +75,9 @@ class SensorProjection {
     float tangent_low_ = 0.0F;  ///< of the elevation at the table's first entry
     float entries_per_tangent_ = 0.0F;
     AlignedVector<std::int32_t> row_of_tangent_;  ///< -1 outside the beams at both ends
-    AlignedVector<float> column_zero_;            ///< [H] column of a beam at azimuth 0
-    AlignedVector<float> column_per_inverse_m_;   ///< [H] correction for the beam's origin: divided by the distance
-    AlignedVector<float> no_shift_;               ///< [H] zeros
+    AlignedVector<float> column_zero_;            ///< [1 + H] column of a beam at azimuth 0; first a row outside
+    AlignedVector<float> column_per_inverse_m_;   ///< [1 + H] correction for the beam's origin: divided by the distance
+    AlignedVector<float> no_shift_;               ///< [1 + H] zeros
 };
 
 }  // namespace dlod

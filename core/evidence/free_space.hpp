@@ -1,0 +1,63 @@
+// Free-space evidence: was the place of a return seen free, occupied, or not at all by earlier frames?
+#pragma once
+
+#include <span>
+
+#include "core/evidence/reference_images.hpp"
+#include "core/projection/range_image.hpp"
+#include "core/types/frame.hpp"
+#include "core/types/parameter.hpp"
+
+namespace dlod {
+
+struct FreeSpaceConfig {
+    double margin_m = 0.12;
+    double margin_per_m = 0.01;
+    double occupied_tolerance_m = 0.1;
+    double near_m = 4.0;
+    int octaves = 6;
+
+    template <class V>
+    void visit(V& v) {
+        v.parameter("margin_m", margin_m, Range{0.01, 2.0}, "m",
+                    "an earlier frame must have seen so much farther than a point for its place to count as free; "
+                    "higher is safer, slower");
+        v.parameter("margin_per_m", margin_per_m, Range{0.0, 0.2}, "1", "growth of that margin with range");
+        v.parameter("occupied_tolerance_m", occupied_tolerance_m, Range{0.01, 1.0}, "m",
+                    "an earlier return within this (plus margin_per_m) of a point makes its place occupied");
+        v.parameter("near_m", near_m, Range{0.0, 50.0}, "m",
+                    "nearer points are compared with a wider window, for errors of the pose");
+        v.parameter("octaves", octaves, Range{1, 10}, "1",
+                    "earlier frames used: the last and one in each of so many octaves of age");
+    }
+};
+
+/// Points to be tested, sorted by block of columns (structure of arrays).
+struct CandidatePoints {
+    AlignedVector<PixelIndex> pixel;
+    AlignedVector<float> x, y, z;          ///< sensor frame at the stamp, deskewed
+    AlignedVector<std::uint32_t> codes;    ///< result: two bits a reference, newest lowest (FreeSpace::Code)
+    std::vector<std::uint32_t> block_end;  ///< [Reference::kBlocks] end of each block's points
+    std::size_t size() const { return pixel.size(); }
+};
+
+/// Compares points with references.
+class FreeSpace {
+  public:
+    enum Code : std::uint32_t { kUnknown = 0, kFree = 1, kOccupied = 2 };
+
+    FreeSpace(const SensorModel& sensor, const FreeSpaceConfig& config);
+
+    /// Fills points.codes: what each of the references saw at each point.
+    void test(const OdometryResult& odometry, std::span<const Reference* const> references, CandidatePoints& points);
+
+  private:
+    FreeSpaceConfig config_;
+    SensorProjection projection_;
+    AlignedVector<std::uint8_t> late_;  ///< [H * W] 1: fired in the second half of the sweep
+    int max_shift_ = 0;
+    AlignedVector<std::int32_t> pixel_;
+    AlignedVector<float> range_;
+};
+
+}  // namespace dlod

@@ -1,0 +1,67 @@
+// What earlier frames saw, kept for free-space evidence: range images at spread ages with the pose of every column.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/types/frame.hpp"
+
+namespace dlod {
+
+/// Range as references store it: 4 mm a unit, up to 262 m; 0 no return.
+inline constexpr float kReferenceUnit_m = 0.004F;
+
+/// One earlier frame.
+struct Reference {
+    /// Blocks of destaggered columns that share one pose: 1.6 ms at 10 Hz.
+    static constexpr int kBlocks = 64;
+
+    Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();  ///< at its stamp
+    std::vector<Eigen::Isometry3f> T_block_stamp;  ///< [kBlocks] stamp to the firing time of the block's middle
+    std::vector<Eigen::Isometry3f>
+        T_block_stamp_late;  ///< likewise where the block lies at the image's seam and was fired at the sweep's end
+    AlignedVector<float> column_shift;  ///< [H] columns by which yaw within a block moves each row (pixel shift)
+    /// Nearest return of the pixel's window (low 16 bits) and farthest (high 16 bits), in units; 0 where too many of
+    /// the window's pixels have no return. Two images one after the other: for far and for near points.
+    AlignedVector<std::uint32_t> window;
+    std::int64_t stamp_ns = 0;
+    std::uint64_t number = 0;  ///< counts references from 0
+};
+
+/// Keeps the last frame and about one in each octave of age (2, 4, 8 ... frames back), in constant memory. Frames in
+/// order.
+class ReferenceImages {
+  public:
+    /// @param levels octaves of age: the oldest reference is about 2^levels frames old
+    ReferenceImages(const SensorModel& sensor, int levels);
+
+    /// Remembers a frame whose odometry is valid.
+    void insert(const Frame& frame);
+    void clear();
+
+    /// References for the next frame, newest first, none twice.
+    const std::vector<const Reference*>& select();
+
+    /// Half widths of the windows, columns and rows.
+    int far_columns() const { return far_columns_; }
+
+  private:
+    void fill_windows(const StructuredCloud& cloud, Reference& reference);
+    void fill_poses(const Frame& frame, Reference& reference) const;
+
+    SensorModel sensor_;
+    int levels_;
+    int far_columns_;
+    int near_columns_;
+    double mean_shift_;
+    std::uint64_t inserted_ = 0;
+    std::vector<Reference> pool_;
+    std::vector<int> users_;  ///< [pool] number of slots that hold it
+    std::vector<int> slots_;  ///< [2 * levels] pool index of the two latest multiples of 2^level, -1 none
+    std::vector<const Reference*> selected_;
+    Image<std::uint16_t> units_;                         ///< ranges of the frame being inserted
+    AlignedVector<std::uint16_t> low_, high_, missing_;  ///< [W + borders] of the pixels above each other, wrapped
+    AlignedVector<std::uint16_t> window_low_, window_high_, window_missing_;  ///< [W] of a row's windows
+};
+
+}  // namespace dlod
