@@ -1,19 +1,78 @@
 #include "core/evidence/detection.hpp"
 
-#include "core/evidence/detection_shape.hpp"
+#include <algorithm>
+
+#include "core/evidence/evidence_image.hpp"
+#include "core/evidence/occlusion.hpp"
 
 namespace dlod {
 
 struct Detector::State {
     State(const SensorModel& sensor, const DetectionConfig& c)
-        : config(c), residuals(sensor), row_ends(2 * static_cast<std::size_t>(sensor.height)) {}
+        : config(c),
+          residuals(sensor),
+          evidence(sensor, c.free_space),
+          parts(sensor, c.parts),
+          row_ends(2 * static_cast<std::size_t>(sensor.height)) {
+        counts.reserve(4096);
+    }
 
+    /// Tested pixels of a segment by what they say.
+    struct Counts {
+        int free = 0, occupied = 0, unknown = 0;
+    };
+
+    void test(const Frame& frame);
+    void count(const Frame& frame);
+    bool is_divided(const Segment& segment, const Counts& c) const;
+    void detect(Frame& frame);
     void add(Frame& frame, std::span<const PixelIndex> pixels);
 
     DetectionConfig config;
     ResidualImage residuals;
+    EvidenceImage evidence;
+    MovingParts parts;
+    std::vector<Counts> counts;  ///< by segment
     std::vector<int> row_ends;
 };
+
+void Detector::State::count(const Frame& frame) {
+    for (const PixelIndex pixel : evidence.tested()) {
+        Counts& c = counts[frame.prepared.segment[pixel] - 1];
+        const Evidence e = evidence[pixel];
+        (e == Evidence::kFree ? c.free : e == Evidence::kOccupied ? c.occupied : c.unknown) += 1;
+    }
+}
+
+/// Free and occupied places in one segment, or free ones in something that is no object: only parts of it move.
+bool Detector::State::is_divided(const Segment& segment, const Counts& c) const {
+    constexpr int kFewest = 3;
+    if (c.free < kFewest) return false;
+    return !segment.feasible || (c.occupied >= kFewest && c.occupied > config.mixed_share * (c.free + c.occupied));
+}
+
+void Detector::State::test(const Frame& frame) {
+    evidence.begin();
+    parts.begin();
+    const Preparation& prepared = frame.prepared;
+    counts.assign(prepared.segments.size(), {});
+    for (const Segment& segment : prepared.segments) {
+        const auto samples = static_cast<std::uint32_t>(config.samples);
+        const std::uint32_t stride = segment.feasible ? (segment.count + samples - 1) / samples
+                                                      : static_cast<std::uint32_t>(config.background_stride);
+        for (std::uint32_t i = stride / 2; i < segment.count; i += stride) {
+            const PixelIndex pixel = prepared.pixels[segment.first + i];
+            if (static_cast<double>(frame.cloud.range_m[pixel]) <= config.max_range_m) evidence.request(pixel);
+        }
+    }
+    evidence.run(frame);
+    count(frame);
+    for (std::size_t s = 0; s < prepared.segments.size(); ++s) {
+        if (is_divided(prepared.segments[s], counts[s])) parts.request_around(frame, prepared.segments[s], evidence);
+    }
+    evidence.run(frame);
+    count(frame);
+}
 
 void Detector::State::add(Frame& frame, std::span<const PixelIndex> pixels) {
     DetectionResult& result = frame.detection;
@@ -21,12 +80,30 @@ void Detector::State::add(Frame& frame, std::span<const PixelIndex> pixels) {
     detection.first = static_cast<std::uint32_t>(result.pixels.size());
     detection.count = static_cast<std::uint32_t>(pixels.size());
     result.pixels.insert(result.pixels.end(), pixels.begin(), pixels.end());
-    measure_shape(pixels, frame.odometry, detection);
     mark_occlusion(pixels, frame.cloud.range_m, config.occlusion_step_m, row_ends, detection);
     if (config.use_residual) {
         const AverageResidual residual = average_residual(pixels, residuals.image());
         detection.average_residual_m = residual.mean_m;
         detection.residual_points = residual.count;
+    }
+    if (!config.use_free_space) return;
+    for (const PixelIndex pixel : pixels) {
+        const Evidence e = evidence[pixel];
+        detection.free_points += e == Evidence::kFree ? 1 : 0;
+        detection.occupied_points += e == Evidence::kOccupied ? 1 : 0;
+        detection.unknown_points += e == Evidence::kUnknown ? 1 : 0;
+    }
+}
+
+void Detector::State::detect(Frame& frame) {
+    const Preparation& prepared = frame.prepared;
+    for (std::size_t s = 0; s < prepared.segments.size(); ++s) {
+        const Segment& segment = prepared.segments[s];
+        if (config.use_free_space && is_divided(segment, counts[s])) {
+            parts.find(frame, segment, evidence, [&](std::span<const PixelIndex> pixels) { add(frame, pixels); });
+        } else if (segment.feasible && static_cast<double>(segment.max_range_m) <= config.max_range_m) {
+            add(frame, std::span(prepared.pixels).subspan(segment.first, segment.count));
+        }
     }
 }
 
@@ -40,10 +117,10 @@ void Detector::process(Frame& frame) {
     frame.detection.detections.clear();
     state.residuals.update(frame.odometry);
     if (!frame.odometry.valid) return;
-    for (const Segment& segment : frame.prepared.segments) {
-        if (!segment.feasible || static_cast<double>(segment.max_range_m) > state.config.max_range_m) continue;
-        state.add(frame, std::span(frame.prepared.pixels).subspan(segment.first, segment.count));
-    }
+    if ((frame.odometry.flags & OdometryResult::kReinitialized) != 0) state.evidence.forget();
+    if (state.config.use_free_space) state.test(frame);
+    state.detect(frame);
+    if (state.config.use_free_space) state.evidence.remember(frame);
 }
 
 const Image<float>& Detector::residual_image() const {

@@ -3,6 +3,8 @@
 
 #include <memory>
 
+#include "core/evidence/free_space.hpp"
+#include "core/evidence/moving_parts.hpp"
 #include "core/residuals/residual_image.hpp"
 #include "core/types/frame.hpp"
 #include "core/types/parameter.hpp"
@@ -14,6 +16,11 @@ struct DetectionConfig {
     bool use_free_space = true;
     double max_range_m = 50.0;
     double occlusion_step_m = 0.3;
+    int samples = 150;
+    int background_stride = 8;
+    double mixed_share = 0.25;
+    FreeSpaceConfig free_space;
+    MovingPartsConfig parts;
 
     template <class V>
     void visit(V& v) {
@@ -22,11 +29,20 @@ struct DetectionConfig {
         v.parameter("max_range_m", max_range_m, Range{1.0, 200.0}, "m", "objects farther away are not looked for");
         v.parameter("occlusion_step_m", occlusion_step_m, Range{0.05, 5.0}, "m",
                     "a neighbour nearer by more than this hides the detection's side");
+        v.parameter("samples", samples, Range{10, 100000}, "pixels",
+                    "pixels of a feasible segment that are tested for free space; higher is slower");
+        v.parameter(
+            "background_stride", background_stride, Range{1, 64}, "pixels",
+            "of segments that are no objects every n-th pixel is tested; higher is faster, finds less at walls");
+        v.parameter("mixed_share", mixed_share, Range{0.0, 1.0}, "1",
+                    "a segment of which this share of the evidence says occupied, and the rest free, is divided");
+        v.group("free_space", free_space, "comparison with earlier frames");
+        v.group("parts", parts, "moving parts of segments");
     }
 };
 
-/// Fills frame.detection.pixels and .detections (without track) from frame.prepared and frame.odometry, and remembers
-/// what was seen free. Frames in order.
+/// Fills frame.detection.pixels and .detections (pixels, residual, evidence, occlusion; their shapes are the tracker's)
+/// from frame.prepared and frame.odometry, and remembers what was seen free. Frames in order.
 class Detector {
   public:
     Detector(const SensorModel& sensor, const DetectionConfig& config);

@@ -11,12 +11,12 @@ namespace {
 struct CompareParameters {
     float margin, margin_per_m, tolerance, near;
     std::int32_t pixels;
-    std::uint32_t bit;
+    float occupied_weight;
 };
 
 DLOD_MULTIVERSION void compare(CompareParameters p, int n, const std::int32_t* __restrict pixel,
                                const float* __restrict range, const std::uint32_t* __restrict window,
-                               std::uint32_t* __restrict codes) {
+                               float* __restrict free, float* __restrict occupied) {
     for (int i = 0; i < n; ++i) {
         const std::int32_t inside = pixel[i] >= 0 ? pixel[i] : 0;
         const std::uint32_t seen = window[inside + (range[i] < p.near ? p.pixels : 0)];
@@ -27,8 +27,8 @@ DLOD_MULTIVERSION void compare(CompareParameters p, int n, const std::int32_t* _
         const bool is_free = known & (nearest > range[i] + p.margin + grown);
         const bool is_occupied =
             known & (nearest <= range[i] + p.tolerance + grown) & (farthest >= range[i] - p.tolerance - grown);
-        codes[i] |= (is_free ? static_cast<std::uint32_t>(FreeSpace::kFree) : 0U) << p.bit;
-        codes[i] |= (is_occupied ? static_cast<std::uint32_t>(FreeSpace::kOccupied) : 0U) << p.bit;
+        free[i] += is_free ? 1.0F : 0.0F;
+        occupied[i] += is_occupied ? p.occupied_weight : 0.0F;
     }
 }
 
@@ -47,9 +47,10 @@ FreeSpace::FreeSpace(const SensorModel& sensor, const FreeSpaceConfig& config) :
     range_.assign(sensor.pixels(), 0.0F);
 }
 
-void FreeSpace::test(const OdometryResult& odometry, std::span<const Reference* const> references,
-                     CandidatePoints& points) {
-    points.codes.assign(points.size(), 0);
+void FreeSpace::test(const Frame& frame, std::span<const Reference* const> references, CandidatePoints& points) {
+    points.free.assign(points.size(), 0.0F);
+    points.occupied.assign(points.size(), 0.0F);
+    const OdometryResult& odometry = frame.odometry;
     const int width = projection_.width();
     std::uint32_t begin = 0;
     for (const std::uint32_t end : points.block_end) {
@@ -58,19 +59,22 @@ void FreeSpace::test(const OdometryResult& odometry, std::span<const Reference* 
         // A point in the middle of the block, for the time at which the references looked there.
         const std::uint32_t middle = begin + static_cast<std::uint32_t>(n) / 2;
         const Eigen::Vector3f typical(points.x[middle], points.y[middle], points.z[middle]);
-        for (std::size_t k = 0; k < references.size(); ++k) {
-            const Reference& reference = *references[k];
+        for (const Reference* const earlier : references) {
+            const Reference& reference = *earlier;
             const Eigen::Isometry3f T_reference_sensor =
                 (reference.T_world_sensor.inverse() * odometry.T_world_sensor).cast<float>();
             const float* x = points.x.data() + begin;
             const float* y = points.y.data() + begin;
             const float* z = points.z.data() + begin;
+            const double age_s = 1e-9 * static_cast<double>(frame.header.stamp_ns - reference.stamp_ns);
+            const auto weight =
+                static_cast<float>(config_.settle_s > 0.0 ? std::clamp(age_s / config_.settle_s, 0.0, 1.0) : 1.0);
             const CompareParameters parameters{static_cast<float>(config_.margin_m),
                                                static_cast<float>(config_.margin_per_m),
                                                static_cast<float>(config_.occupied_tolerance_m),
                                                static_cast<float>(config_.near_m),
                                                static_cast<std::int32_t>(late_.size()),
-                                               2U * static_cast<std::uint32_t>(k)};
+                                               weight};
             const auto column_of = [&](const Eigen::Isometry3f& T) {
                 const Eigen::Vector3f p = T * typical;
                 const auto pixel = projection_.project(Eigen::Vector3f(p.x(), p.y(), 0.0F));
@@ -95,7 +99,8 @@ void FreeSpace::test(const OdometryResult& odometry, std::span<const Reference* 
                     }
                 }
             }
-            compare(parameters, n, pixel_.data(), range_.data(), reference.window.data(), points.codes.data() + begin);
+            compare(parameters, n, pixel_.data(), range_.data(), reference.window.data(), points.free.data() + begin,
+                    points.occupied.data() + begin);
             if (seam && block + 1 < Reference::kBlocks) {
                 projection_.project(reference.T_block_stamp_late[block] * T_reference_sensor, n, x, y, z,
                                     reference.column_shift.data(), pixel_.data(), range_.data());
@@ -104,7 +109,7 @@ void FreeSpace::test(const OdometryResult& odometry, std::span<const Reference* 
                     if (pixel >= 0 && late_[static_cast<std::size_t>(pixel)] == 0) pixel = -1;
                 }
                 compare(parameters, n, pixel_.data(), range_.data(), reference.window.data(),
-                        points.codes.data() + begin);
+                        points.free.data() + begin, points.occupied.data() + begin);
             }
         }
         begin = end;

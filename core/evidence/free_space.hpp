@@ -16,6 +16,7 @@ struct FreeSpaceConfig {
     double occupied_tolerance_m = 0.1;
     double near_m = 4.0;
     int octaves = 6;
+    double settle_s = 0.8;
 
     template <class V>
     void visit(V& v) {
@@ -29,6 +30,8 @@ struct FreeSpaceConfig {
                     "nearer points are compared with a wider window, for errors of the pose");
         v.parameter("octaves", octaves, Range{1, 10}, "1",
                     "earlier frames used: the last and one in each of so many octaves of age");
+        v.parameter("settle_s", settle_s, Range{0.0, 10.0}, "s",
+                    "a frame so old that saw a place occupied counts fully against motion, younger ones less");
     }
 };
 
@@ -36,7 +39,8 @@ struct FreeSpaceConfig {
 struct CandidatePoints {
     AlignedVector<PixelIndex> pixel;
     AlignedVector<float> x, y, z;          ///< sensor frame at the stamp, deskewed
-    AlignedVector<std::uint32_t> codes;    ///< result: two bits a reference, newest lowest (FreeSpace::Code)
+    AlignedVector<float> free, occupied;   ///< results: for how many references the place was free, and was occupied;
+                                           ///< the latter weighted by age, since what moves slowly was here just before
     std::vector<std::uint32_t> block_end;  ///< [Reference::kBlocks] end of each block's points
     std::size_t size() const { return pixel.size(); }
 };
@@ -44,12 +48,10 @@ struct CandidatePoints {
 /// Compares points with references.
 class FreeSpace {
   public:
-    enum Code : std::uint32_t { kUnknown = 0, kFree = 1, kOccupied = 2 };
-
     FreeSpace(const SensorModel& sensor, const FreeSpaceConfig& config);
 
-    /// Fills points.codes: what each of the references saw at each point.
-    void test(const OdometryResult& odometry, std::span<const Reference* const> references, CandidatePoints& points);
+    /// Fills points.free and points.occupied: what the references saw at each point.
+    void test(const Frame& frame, std::span<const Reference* const> references, CandidatePoints& points);
 
   private:
     FreeSpaceConfig config_;

@@ -1,56 +1,8 @@
-#include "core/evidence/detection_shape.hpp"
+#include "core/evidence/occlusion.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 
 namespace dlod {
-
-void measure_shape(std::span<const PixelIndex> pixels, const OdometryResult& odometry, Detection& detection) {
-    if (pixels.empty()) return;
-    const Eigen::Matrix3d R = odometry.T_world_sensor.linear();
-    const Eigen::Vector3d t = odometry.T_world_sensor.translation();
-    const auto point = [&](PixelIndex p) {
-        return Eigen::Vector3d(R * Eigen::Vector3d(static_cast<double>(odometry.x[p]),
-                                                   static_cast<double>(odometry.y[p]),
-                                                   static_cast<double>(odometry.z[p])));
-    };
-    const Eigen::Vector3d origin = point(pixels.front());
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    double xx = 0.0;
-    double xy = 0.0;
-    double yy = 0.0;
-    for (const PixelIndex p : pixels) {
-        const Eigen::Vector3d d = point(p) - origin;
-        sum += d;
-        xx += d.x() * d.x();
-        xy += d.x() * d.y();
-        yy += d.y() * d.y();
-    }
-    const auto n = static_cast<double>(pixels.size());
-    const Eigen::Vector3d mean = sum / n;
-    xx = xx / n - mean.x() * mean.x();
-    xy = xy / n - mean.x() * mean.y();
-    yy = yy / n - mean.y() * mean.y();
-    const double yaw = 0.5 * std::atan2(2.0 * xy, xx - yy);
-    const double c = std::cos(yaw);
-    const double s = std::sin(yaw);
-    Eigen::Vector3d low = Eigen::Vector3d::Constant(std::numeric_limits<double>::max());
-    Eigen::Vector3d high = -low;
-    for (const PixelIndex p : pixels) {
-        const Eigen::Vector3d d = point(p) - origin;
-        const Eigen::Vector3d along(c * d.x() + s * d.y(), -s * d.x() + c * d.y(), d.z());
-        low = low.cwiseMin(along);
-        high = high.cwiseMax(along);
-    }
-    const Eigen::Vector3d middle = 0.5 * (low + high);
-    detection.centroid_m = origin + mean + t;
-    detection.height_m = high.z() - low.z();
-    detection.box.yaw_rad = yaw;
-    detection.box.size_m = high - low;
-    detection.box.center_m =
-        origin + t + Eigen::Vector3d(c * middle.x() - s * middle.y(), s * middle.x() + c * middle.y(), middle.z());
-}
 
 void mark_occlusion(std::span<const PixelIndex> pixels, const Image<float>& range_m, double min_step_m,
                     std::span<int> row_ends, Detection& detection) {

@@ -1,0 +1,70 @@
+#include "core/evidence/evidence_image.hpp"
+
+#include <algorithm>
+
+namespace dlod {
+namespace {
+
+// A requested pixel counts as unknown until run() has tested it.
+constexpr auto kRequested = static_cast<std::uint8_t>(Evidence::kUnknown);
+
+/// Free where some reference is sure of it and not many more object; occupied where they object for long enough.
+Evidence judge(float free, float occupied) {
+    if (free >= 1.0F && occupied <= free + 1.0F) return Evidence::kFree;
+    return occupied >= 1.0F ? Evidence::kOccupied : Evidence::kUnknown;
+}
+
+}  // namespace
+
+EvidenceImage::EvidenceImage(const SensorModel& sensor, const FreeSpaceConfig& config)
+    : width_(sensor.width),
+      free_space_(sensor, config),
+      references_(sensor, config.octaves),
+      image_(sensor.height, sensor.width, 0) {
+    requested_.reserve(sensor.pixels());
+    points_.block_end.assign(Reference::kBlocks, 0);
+}
+
+void EvidenceImage::begin() {
+    image_.fill(0);
+    requested_.clear();
+    points_.pixel.clear();
+    selected_ = references_.select();
+}
+
+void EvidenceImage::request(PixelIndex pixel) {
+    if (image_[pixel] != 0) return;
+    image_[pixel] = kRequested;
+    requested_.push_back(pixel);
+}
+
+void EvidenceImage::sort_into_blocks(const OdometryResult& odometry) {
+    const auto width = static_cast<std::uint32_t>(width_);
+    const auto block_of = [width](PixelIndex pixel) { return pixel % width * Reference::kBlocks / width; };
+    std::fill(points_.block_end.begin(), points_.block_end.end(), 0);
+    for (const PixelIndex pixel : requested_) ++points_.block_end[block_of(pixel)];
+    std::uint32_t sum = 0;
+    for (std::uint32_t& end : points_.block_end) {
+        const std::uint32_t count = end;
+        end = sum;
+        sum += count;
+    }
+    points_.pixel.resize(sum);
+    for (auto* v : {&points_.x, &points_.y, &points_.z}) v->resize(sum);
+    for (const PixelIndex pixel : requested_) {
+        const std::uint32_t i = points_.block_end[block_of(pixel)]++;
+        points_.pixel[i] = pixel;
+        points_.x[i] = odometry.x[pixel];
+        points_.y[i] = odometry.y[pixel];
+        points_.z[i] = odometry.z[pixel];
+    }
+}
+
+void EvidenceImage::run(const Frame& frame) {
+    sort_into_blocks(frame.odometry);
+    requested_.clear();
+    free_space_.test(frame, selected_, points_);
+    for (std::size_t i = 0; i < points_.size(); ++i) set(points_.pixel[i], judge(points_.free[i], points_.occupied[i]));
+}
+
+}  // namespace dlod

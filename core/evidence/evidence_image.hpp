@@ -1,0 +1,47 @@
+// Free-space evidence as an image: for the pixels that were tested, whether the place was free, occupied or unknown.
+#pragma once
+
+#include <span>
+
+#include "core/evidence/free_space.hpp"
+#include "core/evidence/reference_images.hpp"
+#include "core/types/frame.hpp"
+
+namespace dlod {
+
+enum class Evidence : std::uint8_t { kUntested = 0, kUnknown = 1, kFree = 2, kOccupied = 3 };
+
+/// Chooses the pixels to test, tests them and keeps the result of one frame.
+class EvidenceImage {
+  public:
+    EvidenceImage(const SensorModel& sensor, const FreeSpaceConfig& config);
+
+    /// Starts a frame: nothing tested, references chosen.
+    void begin();
+    /// Asks for a test of the pixel, once a frame; it takes place in run().
+    void request(PixelIndex pixel);
+    /// Tests all requested pixels.
+    void run(const Frame& frame);
+    /// Remembers the frame for later ones.
+    void remember(const Frame& frame) { references_.insert(frame); }
+    /// Forgets all earlier frames: their poses no longer fit.
+    void forget() { references_.clear(); }
+
+    Evidence operator[](PixelIndex pixel) const { return static_cast<Evidence>(image_[pixel]); }
+    void set(PixelIndex pixel, Evidence evidence) { image_[pixel] = static_cast<std::uint8_t>(evidence); }
+    /// Pixels tested by the last run().
+    std::span<const PixelIndex> tested() const { return points_.pixel; }
+
+  private:
+    void sort_into_blocks(const OdometryResult& odometry);
+
+    int width_;
+    FreeSpace free_space_;
+    ReferenceImages references_;
+    std::vector<const Reference*> selected_;
+    Image<std::uint8_t> image_;
+    std::vector<PixelIndex> requested_;
+    CandidatePoints points_;
+};
+
+}  // namespace dlod

@@ -1,0 +1,81 @@
+#include "core/evidence/moving_parts.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace dlod {
+namespace {
+
+constexpr int kMaxWindow = 24;  // pixels to each side that are tested around a free one
+
+}  // namespace
+
+MovingParts::MovingParts(const SensorModel& sensor, const MovingPartsConfig& config)
+    : sensor_(sensor), config_(config), taken_(sensor.height, sensor.width, 0) {
+    part_.reserve(sensor.pixels());
+    away_m_.reserve(sensor.pixels());
+}
+
+void MovingParts::request_around(const Frame& frame, const Segment& segment, EvidenceImage& evidence) const {
+    const double column_rad = 2.0 * std::numbers::pi / sensor_.width;
+    const double row_rad = std::abs(static_cast<double>(sensor_.altitude_rad.front() - sensor_.altitude_rad.back())) /
+                           std::max(1, sensor_.height - 1);
+    const std::uint32_t label = frame.prepared.segment[frame.prepared.pixels[segment.first]];
+    for (const PixelIndex pixel : pixels_of(frame, segment)) {
+        if (evidence[pixel] != Evidence::kFree) continue;
+        const double reach_rad = config_.reach_m / std::max(0.5, static_cast<double>(frame.cloud.range_m[pixel]));
+        const int columns = std::clamp(static_cast<int>(reach_rad / column_rad), 2, kMaxWindow);
+        const int rows = std::clamp(static_cast<int>(reach_rad / row_rad), 2, kMaxWindow);
+        const int row = static_cast<int>(pixel) / sensor_.width;
+        const int column = static_cast<int>(pixel) % sensor_.width;
+        for (int r = std::max(0, row - rows); r <= std::min(sensor_.height - 1, row + rows); ++r) {
+            for (int dc = -columns; dc <= columns; ++dc) {
+                const int c = (column + dc + sensor_.width) % sensor_.width;
+                const auto p = static_cast<PixelIndex>(r * sensor_.width + c);
+                if (frame.prepared.segment[p] == label) evidence.request(p);
+            }
+        }
+    }
+}
+
+bool MovingParts::grow(const Frame& frame, const Segment& segment, const EvidenceImage& evidence, PixelIndex seed) {
+    const std::uint32_t label = frame.prepared.segment[frame.prepared.pixels[segment.first]];
+    const auto& odometry = frame.odometry;
+    const auto reach = static_cast<float>(config_.reach_m);
+    const auto width = static_cast<PixelIndex>(sensor_.width);
+    const auto size = static_cast<PixelIndex>(sensor_.pixels());
+    part_.clear();
+    away_m_.clear();
+    part_.push_back(seed);
+    away_m_.push_back(0.0F);
+    taken_[seed] = 1;
+    std::size_t free = 0;
+    for (std::size_t next = 0; next < part_.size(); ++next) {
+        const PixelIndex p = part_[next];
+        if (evidence[p] == Evidence::kFree) {
+            away_m_[next] = 0.0F;
+            ++free;
+        }
+        const PixelIndex column = p % width;
+        const std::array<PixelIndex, 4> neighbours{p - width, p + width, column == 0 ? p + width - 1 : p - 1,
+                                                   column + 1 == width ? p + 1 - width : p + 1};
+        for (const PixelIndex q : neighbours) {
+            if (q >= size || taken_[q] != 0 || frame.prepared.segment[q] != label || evidence[q] == Evidence::kOccupied)
+                continue;
+            const float step = Eigen::Vector3f(odometry.x[q] - odometry.x[p], odometry.y[q] - odometry.y[p],
+                                               odometry.z[q] - odometry.z[p])
+                                   .norm();
+            const float away = evidence[q] == Evidence::kFree ? 0.0F : away_m_[next] + step;
+            if (away > reach) continue;
+            taken_[q] = 1;
+            part_.push_back(q);
+            away_m_.push_back(away);
+        }
+    }
+    return part_.size() >= static_cast<std::size_t>(config_.min_points) &&
+           static_cast<double>(free) >= config_.min_free_share * static_cast<double>(part_.size());
+}
+
+}  // namespace dlod

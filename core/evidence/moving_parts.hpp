@@ -1,0 +1,63 @@
+// Parts of a segment that free-space evidence singles out: a person who touches a wall, an object within clutter.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/evidence/evidence_image.hpp"
+#include "core/types/frame.hpp"
+#include "core/types/parameter.hpp"
+
+namespace dlod {
+
+struct MovingPartsConfig {
+    double reach_m = 0.3;
+    int min_points = 8;
+    double min_free_share = 0.4;
+
+    template <class V>
+    void visit(V& v) {
+        v.parameter("reach_m", reach_m, Range{0.01, 2.0}, "m",
+                    "pixels without evidence join a moving part within this distance");
+        v.parameter("min_points", min_points, Range{1, 1000}, "pixels", "smaller parts are noise");
+        v.parameter("min_free_share", min_free_share, Range{0.0, 1.0}, "1",
+                    "share of a part's pixels that must lie where it was free");
+    }
+};
+
+class MovingParts {
+  public:
+    MovingParts(const SensorModel& sensor, const MovingPartsConfig& config);
+
+    /// Requests tests of the segment's pixels around those that were found free.
+    void request_around(const Frame& frame, const Segment& segment, EvidenceImage& evidence) const;
+
+    /// Connected parts of the segment around free pixels, without those that were occupied. Calls part(pixels) for
+    /// each.
+    template <class F>
+    void find(const Frame& frame, const Segment& segment, const EvidenceImage& evidence, F&& part) {
+        for (const PixelIndex seed : pixels_of(frame, segment)) {
+            if (starts(evidence, seed) && grow(frame, segment, evidence, seed))
+                part(std::span<const PixelIndex>(part_));
+        }
+    }
+    /// Starts a frame.
+    void begin() { taken_.fill(0); }
+
+  private:
+    static std::span<const PixelIndex> pixels_of(const Frame& frame, const Segment& segment) {
+        return std::span(frame.prepared.pixels).subspan(segment.first, segment.count);
+    }
+    bool starts(const EvidenceImage& evidence, PixelIndex pixel) const {
+        return taken_[pixel] == 0 && evidence[pixel] == Evidence::kFree;
+    }
+    bool grow(const Frame& frame, const Segment& segment, const EvidenceImage& evidence, PixelIndex seed);
+
+    SensorModel sensor_;
+    MovingPartsConfig config_;
+    Image<std::uint8_t> taken_;  ///< 1: the pixel has been looked at
+    std::vector<PixelIndex> part_;
+    std::vector<float> away_m_;  ///< of each of part_: way from the last free pixel
+};
+
+}  // namespace dlod
