@@ -1,6 +1,5 @@
 // Command line of dlod.
 #include <CLI/CLI.hpp>
-
 #include <cstdio>
 #include <exception>
 
@@ -27,13 +26,15 @@ void add_setting(CLI::App& command, const std::string& flag, const std::string& 
 }
 
 void add_config_options(CLI::App& command, dlod::daemon::ConfigSources& config) {
-    command.add_option("-c,--config", config.file, "configuration file (YAML); keys that it does not name keep their defaults");
-    command.add_option_function<std::vector<std::string>>(
-               "--set",
-               [&config](const std::vector<std::string>& values) {
-                   config.settings.insert(config.settings.end(), values.begin(), values.end());
-               },
-               "a single setting, key=value; may be repeated")
+    command.add_option("-c,--config", config.file,
+                       "configuration file (YAML); keys that it does not name keep their defaults");
+    command
+        .add_option_function<std::vector<std::string>>(
+            "--set",
+            [&config](const std::vector<std::string>& values) {
+                config.settings.insert(config.settings.end(), values.begin(), values.end());
+            },
+            "a single setting, key=value; may be repeated")
         ->allow_extra_args(false);
 }
 
@@ -55,19 +56,24 @@ int main(int argc, char** argv) {
     auto* run_command = app.add_subcommand("run", "process a live sensor's packets until SIGINT or SIGTERM");
     add_config_options(*run_command, run_arguments.config);
     add_setting(*run_command, "--metadata", "sensor.metadata", run_arguments.config.settings, "sensor metadata (JSON)");
-    add_setting(*run_command, "--threads", "pipeline.threads", run_arguments.config.settings, "threads that run the stages");
+    add_setting(*run_command, "--threads", "pipeline.threads", run_arguments.config.settings,
+                "threads that run the stages");
     add_setting(*run_command, "--out", "output.folder", run_arguments.config.settings, "folder for result files");
     add_setting(*run_command, "--lcm", "lcm.url", run_arguments.config.settings, "LCM provider, or none");
 
     ReplayArguments replay_arguments;
     auto* replay_command = app.add_subcommand("replay", "process a capture (pcap, pcapng)");
     replay_command->add_option("PCAP", replay_arguments.capture, "capture file")->required();
-    replay_command->add_option("--metadata", replay_arguments.metadata, "sensor metadata (JSON); default: PCAP's name with .json");
+    replay_command->add_option("--metadata", replay_arguments.metadata,
+                               "sensor metadata (JSON); default: PCAP's name with .json");
     add_config_options(*replay_command, replay_arguments.config);
-    add_setting(*replay_command, "--threads", "pipeline.threads", replay_arguments.config.settings, "threads that run the stages");
+    add_setting(*replay_command, "--threads", "pipeline.threads", replay_arguments.config.settings,
+                "threads that run the stages");
     add_setting(*replay_command, "--out", "output.folder", replay_arguments.config.settings, "folder for result files");
     add_setting(*replay_command, "--lcm", "lcm.url", replay_arguments.config.settings, "LCM provider; default: none");
-    replay_command->add_option("--rate", replay_arguments.rate, "0: as fast as possible (default), 1: true rate, 2: twice as fast, ...")
+    replay_command
+        ->add_option("--rate", replay_arguments.rate,
+                     "0: as fast as possible (default), 1: true rate, 2: twice as fast, ...")
         ->check(CLI::Range(0.0, 1000.0));
 
     std::filesystem::path info_file;
@@ -84,7 +90,8 @@ int main(int argc, char** argv) {
 
     ConfigSources printed;
     std::optional<std::filesystem::path> printed_metadata;
-    auto* print_command = app.add_subcommand("print-config", "print every key with its meaning and its value in effect");
+    auto* print_command =
+        app.add_subcommand("print-config", "print every key with its meaning and its value in effect");
     add_config_options(*print_command, printed);
     print_command->add_option("--metadata", printed_metadata, "with this sensor's preset");
 

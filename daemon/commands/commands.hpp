@@ -2,12 +2,12 @@
 // throws the errors that main() turns into exit codes.
 #pragma once
 
-#include "daemon/commands/exit_code.hpp"
-
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "daemon/commands/exit_code.hpp"
 
 namespace dlod::daemon {
 

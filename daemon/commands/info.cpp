@@ -14,10 +14,11 @@ void print_sensor(const driver::SensorInfo& sensor) {
     const auto& model = sensor.model;
     std::printf("sensor    %s, serial %s, firmware %s\n", sensor.product_line.c_str(), sensor.serial_number.c_str(),
                 sensor.firmware.c_str());
-    std::printf("mode      %s: %d x %d, %.0f Hz, columns %d to %d\n", sensor.lidar_mode.c_str(), model.height, model.width,
-                1.0 / model.frame_period_s, model.column_window_first, model.column_window_last);
+    std::printf("mode      %s: %d x %d, %.0f Hz, columns %d to %d\n", sensor.lidar_mode.c_str(), model.height,
+                model.width, 1.0 / model.frame_period_s, model.column_window_first, model.column_window_last);
     std::printf("profile   %s, IMU %s, %d columns a packet\n", sensor.profile_name.c_str(),
-                sensor.imu_profile_name.empty() ? "LEGACY" : sensor.imu_profile_name.c_str(), sensor.columns_per_packet);
+                sensor.imu_profile_name.empty() ? "LEGACY" : sensor.imu_profile_name.c_str(),
+                sensor.columns_per_packet);
     std::printf("ports     lidar %d, IMU %d\n", sensor.lidar_port, sensor.imu_port);
     std::printf("clock     %s\n", sensor.timestamp_mode.empty() ? "not stated" : sensor.timestamp_mode.c_str());
     for (const auto& warning : sensor.warnings) std::printf("warning   %s\n", warning.c_str());
@@ -52,7 +53,8 @@ void print_capture(const std::filesystem::path& file, const driver::SensorInfo& 
     // Zeros say nothing but the totals'.
     const driver::CounterVisitor print = [](std::string_view name, std::uint64_t value) {
         if (value == 0 && name != "packets" && name != "frames") return;
-        std::printf("  %-22.*s %llu\n", static_cast<int>(name.size()), name.data(), static_cast<unsigned long long>(value));
+        std::printf("  %-22.*s %llu\n", static_cast<int>(name.size()), name.data(),
+                    static_cast<unsigned long long>(value));
     };
     std::printf("capture\n");
     source.visit_counters(print);

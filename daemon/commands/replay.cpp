@@ -30,8 +30,9 @@ class ProgressBar {
         if (!terminal_) return;
         constexpr int kWidth = 40;
         const int filled = static_cast<int>(share * kWidth);
-        std::fprintf(stderr, "\r[%.*s%*s] %3.0f %%  %llu frames  %.0f/s ", filled, "########################################",
-                     kWidth - filled, "", 100.0 * share, static_cast<unsigned long long>(frames),
+        std::fprintf(stderr, "\r[%.*s%*s] %3.0f %%  %llu frames  %.0f/s ", filled,
+                     "########################################", kWidth - filled, "", 100.0 * share,
+                     static_cast<unsigned long long>(frames),
                      seconds > 0.0 ? static_cast<double>(frames) / seconds : 0.0);
     }
     void finish() {
@@ -78,7 +79,9 @@ class Summary {
         if (frames_ > 0) print_steps();
         std::printf("packets:");
         const driver::CounterVisitor print_counter = [](std::string_view name, std::uint64_t value) {
-            if (value != 0) std::printf(" %.*s %llu", static_cast<int>(name.size()), name.data(), static_cast<unsigned long long>(value));
+            if (value != 0)
+                std::printf(" %.*s %llu", static_cast<int>(name.size()), name.data(),
+                            static_cast<unsigned long long>(value));
         };
         source.visit_counters(print_counter);
         pipeline.ingest().counters().visit(print_counter);
@@ -112,7 +115,8 @@ ExitCode replay(const ReplayArguments& arguments) {
     for (const auto& warning : sensor.warnings) spdlog::warn("{}", warning);
 
     const auto ports = capture_ports(arguments.capture, sensor, config.sensor);
-    auto capture = std::make_unique<driver::PcapSource>(arguments.capture, driver::PcapOptions{.ports = ports, .reassembly = {}});
+    auto capture =
+        std::make_unique<driver::PcapSource>(arguments.capture, driver::PcapOptions{.ports = ports, .reassembly = {}});
     const driver::PcapSource& progress_of = *capture;
     driver::PacedSource source(std::move(capture), arguments.rate);
     std::unique_ptr<ResultWriter> writer;
@@ -124,12 +128,14 @@ ExitCode replay(const ReplayArguments& arguments) {
     std::unique_ptr<FramePublisher> publisher;
     if (!config.lcm.url.empty() && config.lcm.url != "none") {
         bus = std::make_unique<LcmBus>(config.lcm.url);
-        publisher = std::make_unique<FramePublisher>(*bus, sensor.model, config.extrinsics.T_base_sensor(), config.lcm.channel_prefix);
+        publisher = std::make_unique<FramePublisher>(*bus, sensor.model, config.extrinsics.T_base_sensor(),
+                                                     config.lcm.channel_prefix);
     }
 
     Summary summary;
     FrameSinks sinks;
-    if (publisher) sinks.publish = [&](PipelineFrame& frame) { publisher->publish(frame, frame.header.stamp_ns / 1000); };
+    if (publisher)
+        sinks.publish = [&](PipelineFrame& frame) { publisher->publish(frame, frame.header.stamp_ns / 1000); };
     if (writer) sinks.write = [&](PipelineFrame& frame) { writer->write(frame); };
     sinks.finished = [&](const PipelineFrame& frame) { summary.add(frame); };
     SignalWaiter signals;

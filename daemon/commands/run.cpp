@@ -72,7 +72,8 @@ void reload(const ConfigSources& sources, const driver::SensorInfo& sensor, Conf
 
 ExitCode run(const RunArguments& arguments) {
     Config config = load_config(arguments.config, nullptr);
-    if (config.sensor.metadata.empty()) throw ConfigError("sensor.metadata: needed for a live run: the sensor's metadata file");
+    if (config.sensor.metadata.empty())
+        throw ConfigError("sensor.metadata: needed for a live run: the sensor's metadata file");
     const auto sensor = driver::load_metadata(config.sensor.metadata);
     config = load_config(arguments.config, &sensor);
     set_up_log(config.log.level);
@@ -85,7 +86,8 @@ ExitCode run(const RunArguments& arguments) {
     std::unique_ptr<MessageSender> status_sender;
     if (config.lcm.url != "none") {
         bus = std::make_unique<LcmBus>(config.lcm.url);
-        publisher = std::make_unique<FramePublisher>(*bus, sensor.model, config.extrinsics.T_base_sensor(), config.lcm.channel_prefix);
+        publisher = std::make_unique<FramePublisher>(*bus, sensor.model, config.extrinsics.T_base_sensor(),
+                                                     config.lcm.channel_prefix);
         status_sender = std::make_unique<MessageSender>(*bus);
     }
     std::unique_ptr<ResultWriter> writer;
@@ -100,7 +102,8 @@ ExitCode run(const RunArguments& arguments) {
     if (publisher) {
         sinks.publish = [&, sensor_time = config.lcm.utime_source == 1](PipelineFrame& frame) {
             host_time.add(frame.header.stamp_ns, frame.header.receive_ns);
-            const std::int64_t stamp_ns = sensor_time ? frame.header.stamp_ns : host_time.next_stamp_ns(frame.header.stamp_ns);
+            const std::int64_t stamp_ns =
+                sensor_time ? frame.header.stamp_ns : host_time.next_stamp_ns(frame.header.stamp_ns);
             publisher->publish(frame, stamp_ns / 1000);
         };
     }
@@ -124,7 +127,9 @@ ExitCode run(const RunArguments& arguments) {
     std::int8_t last_health = status_t::WAITING;
     const auto report = [&] {
         CounterList counters;
-        const driver::CounterVisitor collect = [&](std::string_view name, std::uint64_t value) { counters.emplace_back(name, value); };
+        const driver::CounterVisitor collect = [&](std::string_view name, std::uint64_t value) {
+            counters.emplace_back(name, value);
+        };
         source.visit_counters(collect);
         pipeline.ingest().counters().visit(collect);
         collect("pipeline_dropped_frames", pipeline.dropped_frames());
@@ -146,7 +151,8 @@ ExitCode run(const RunArguments& arguments) {
     bool stopping = false;
     auto next_report = std::chrono::steady_clock::now() + kStatusPeriod;
     while (!pipeline.done()) {
-        const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(next_report - std::chrono::steady_clock::now());
+        const auto left =
+            std::chrono::duration_cast<std::chrono::milliseconds>(next_report - std::chrono::steady_clock::now());
         switch (signals.wait(pipeline.done_descriptor(), std::max(left, std::chrono::milliseconds(0)))) {
             case SignalWaiter::Event::kStop:
                 if (!std::exchange(stopping, true)) {
@@ -160,7 +166,8 @@ ExitCode run(const RunArguments& arguments) {
                 service.ready(board.one_line());
                 break;
             case SignalWaiter::Event::kDescriptor:
-            case SignalWaiter::Event::kTimeout: break;
+            case SignalWaiter::Event::kTimeout:
+                break;
         }
         if (std::chrono::steady_clock::now() < next_report) continue;
         next_report += kStatusPeriod;

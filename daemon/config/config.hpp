@@ -1,12 +1,12 @@
 // Everything that can be configured, with its defaults.
 #pragma once
 
-#include "core/method_config.hpp"
-#include "driver/frame_builder.hpp"
-
 #include <array>
 #include <string>
 #include <vector>
+
+#include "core/method_config.hpp"
+#include "driver/frame_builder.hpp"
 
 namespace dlod::daemon {
 
@@ -23,11 +23,14 @@ struct SensorConfig {
 
     template <class V>
     void visit(V& v) {
-        v.text("metadata", metadata, "file with the sensor's metadata (JSON); replay takes the capture's name with .json when empty");
-        v.parameter("lidar_port", lidar_port, Range{0, 65535}, "port", "UDP port of lidar packets; 0: as the metadata says");
+        v.text("metadata", metadata,
+               "file with the sensor's metadata (JSON); replay takes the capture's name with .json when empty");
+        v.parameter("lidar_port", lidar_port, Range{0, 65535}, "port",
+                    "UDP port of lidar packets; 0: as the metadata says");
         v.parameter("imu_port", imu_port, Range{0, 65535}, "port", "UDP port of IMU packets; 0: as the metadata says");
         v.text("bind_address", bind_address, "local address to receive on; empty: every address, IPv4 and IPv6");
-        v.text("multicast_group", multicast_group, "multicast group to join; empty: the sensor sends to this host alone");
+        v.text("multicast_group", multicast_group,
+               "multicast group to join; empty: the sensor sends to this host alone");
         v.text("interface", interface, "network interface on which the group is joined; empty: the kernel chooses");
         v.text("sender", sender, "only packets from this address are taken; empty: from any");
         v.parameter("receive_buffer_bytes", receive_buffer_bytes, Range{65'536, 1'000'000'000}, "byte",
@@ -47,8 +50,10 @@ struct ExtrinsicsConfig {
 
     template <class V>
     void visit(V& v) {
-        v.vector("translation_m", translation_m, Range{-100.0, 100.0}, "m", "position x, y, z of the sensor frame in the base frame");
-        v.vector("rotation_wxyz", rotation_wxyz, Range{-1.0, 1.0}, "1", "unit quaternion w, x, y, z that turns sensor into base axes");
+        v.vector("translation_m", translation_m, Range{-100.0, 100.0}, "m",
+                 "position x, y, z of the sensor frame in the base frame");
+        v.vector("rotation_wxyz", rotation_wxyz, Range{-1.0, 1.0}, "1",
+                 "unit quaternion w, x, y, z that turns sensor into base axes");
     }
 };
 
@@ -61,11 +66,14 @@ struct PipelineConfig {
 
     template <class V>
     void visit(V& v) {
-        v.parameter("threads", threads, Range{1, 64}, "threads", "threads that run the stages; a live run has one more that reads the socket");
+        v.parameter("threads", threads, Range{1, 64}, "threads",
+                    "threads that run the stages; a live run has one more that reads the socket");
         v.parameter("waiting_frames", waiting_frames, Range{1, 64}, "frames",
-                    "live: frames that may wait for the first stage, one more drops the oldest; higher loses less and delays more");
+                    "live: frames that may wait for the first stage, one more drops the oldest; higher loses less and "
+                    "delays more");
         v.list_of("pin_to_cpus", pin_to_cpus, Range{0, 1023}, "CPU", "CPUs that the threads may run on; empty: all");
-        v.parameter("realtime_priority", realtime_priority, Range{0, 99}, "1", "SCHED_FIFO priority of a live run's threads; 0: ordinary scheduling");
+        v.parameter("realtime_priority", realtime_priority, Range{0, 99}, "1",
+                    "SCHED_FIFO priority of a live run's threads; 0: ordinary scheduling");
         v.flag("lock_memory", lock_memory, "keep a live run's memory from being paged out");
     }
 };
@@ -77,9 +85,12 @@ struct LcmConfig {
 
     template <class V>
     void visit(V& v) {
-        v.text("url", url, "LCM provider, say udpm://239.255.76.67:7667?ttl=1; none: publish nothing; empty: none in replay, LCM's default live");
+        v.text("url", url,
+               "LCM provider, say udpm://239.255.76.67:7667?ttl=1; none: publish nothing; empty: none in replay, LCM's "
+               "default live");
         v.text("channel_prefix", channel_prefix, "put before POSE, MASK, TRACKS and STATUS");
-        v.choice("utime_source", utime_source, {"host", "sensor"}, "host: utime is host time (UTC) when live; sensor: the packets' own time");
+        v.choice("utime_source", utime_source, {"host", "sensor"},
+                 "host: utime is host time (UTC) when live; sensor: the packets' own time");
     }
 };
 
@@ -90,7 +101,8 @@ struct OutputConfig {
     template <class V>
     void visit(V& v) {
         v.text("folder", folder, "where trajectory, frames, labels, tracks and map are written; empty: nowhere");
-        v.choice("timing", timing, {"wall", "cpu"}, "what the stage columns of frames.csv measure: elapsed time or the thread's CPU time");
+        v.choice("timing", timing, {"wall", "cpu"},
+                 "what the stage columns of frames.csv measure: elapsed time or the thread's CPU time");
     }
 };
 
@@ -99,7 +111,8 @@ struct LogConfig {
 
     template <class V>
     void visit(V& v) {
-        v.choice("level", level, {"trace", "debug", "info", "warning", "error", "off"}, "least severity of what is logged to stderr");
+        v.choice("level", level, {"trace", "debug", "info", "warning", "error", "off"},
+                 "least severity of what is logged to stderr");
     }
 };
 

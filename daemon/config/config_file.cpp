@@ -17,8 +17,8 @@ namespace {
 }
 
 [[noreturn]] void fail_unknown(const OptionList& options, const std::string& place, const std::string& key) {
-    throw ConfigError(fmt::format("{}: unknown key '{}'; the nearest known one is '{}' (dlod print-config lists all)", place,
-                                  key, nearest_key(options, key)));
+    throw ConfigError(fmt::format("{}: unknown key '{}'; the nearest known one is '{}' (dlod print-config lists all)",
+                                  place, key, nearest_key(options, key)));
 }
 
 bool is_group(const OptionList& options, const std::string& prefix) {
@@ -55,12 +55,15 @@ void with_context(const Option& option, const std::string& place, F&& assign) {
         assign();
     } catch (const ConfigError& error) {
         const std::string unit = option.unit.empty() ? "" : " [" + option.unit + "]";
-        throw ConfigError(fmt::format("{}: {}: {}; valid: {}{}", place, option.key, error.what(), option.valid_values(), unit));
+        throw ConfigError(
+            fmt::format("{}: {}: {}; valid: {}{}", place, option.key, error.what(), option.valid_values(), unit));
     }
 }
 
 void apply_map(const OptionList& options, const YAML::Node& map, const std::string& prefix, const std::string& name) {
-    if (!map.IsMap()) fail(name, map.Mark(), prefix.empty() ? "not a list of 'key: value'" : fmt::format("{}: expected keys below it", prefix));
+    if (!map.IsMap())
+        fail(name, map.Mark(),
+             prefix.empty() ? "not a list of 'key: value'" : fmt::format("{}: expected keys below it", prefix));
     std::set<std::string> seen;
     for (const auto& entry : map) {
         if (!entry.first.IsScalar()) fail(name, entry.first.Mark(), "a key must be a word");
@@ -97,7 +100,8 @@ void apply_file(Config& config, const std::filesystem::path& file) {
         // An empty file leaves the stream failed although nothing is wrong.
         std::error_code error;
         if (!stream.is_open() || std::filesystem::is_directory(file) || std::filesystem::file_size(file, error) != 0) {
-            throw ConfigError(fmt::format("{}: cannot be read; check that the file exists and its permissions", file.string()));
+            throw ConfigError(
+                fmt::format("{}: cannot be read; check that the file exists and its permissions", file.string()));
         }
     }
     apply_yaml(config, text.str(), file.string());
@@ -147,12 +151,14 @@ std::string to_yaml(const Config& config) {
     for (std::size_t i = 0; i < options.size(); ++i) {
         if (const auto* group = std::get_if<OptionGroup>(&options[i])) {
             const std::string indent = indent_of(group->prefix);
-            out += fmt::format("\n{0}# {1}\n{0}{2}:\n", indent, group->about, group->prefix.substr(group->prefix.rfind('.') + 1));
+            out += fmt::format("\n{0}# {1}\n{0}{2}:\n", indent, group->about,
+                               group->prefix.substr(group->prefix.rfind('.') + 1));
             continue;
         }
         const auto& option = std::get<Option>(options[i]);
         const std::string indent = indent_of(option.key);
-        const std::string unit = option.unit.empty() || option.unit == "1" ? "" : fmt::format(" Unit: {}.", option.unit);
+        const std::string unit =
+            option.unit.empty() || option.unit == "1" ? "" : fmt::format(" Unit: {}.", option.unit);
         out += fmt::format("{0}# {1}.\n{0}#{2} Default: {3}. Valid values: {4}.\n", indent, option.effect, unit,
                            std::get<Option>(default_options[i]).to_yaml(), option.valid_values());
         out += fmt::format("{}{}: {}\n", indent, option.key.substr(option.key.rfind('.') + 1), option.to_yaml());

@@ -1,20 +1,21 @@
 // Reading a configuration: built-in defaults, then the sensor's preset, then a YAML file, then single settings.
 #pragma once
 
-#include "daemon/config/config.hpp"
-#include "daemon/config/option.hpp"
-
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "daemon/config/config.hpp"
+#include "daemon/config/option.hpp"
+
 namespace dlod::daemon {
 
 /// Applies YAML text to `config`; keys that it does not name keep their values.
 /// @param name of the file, for messages
-/// @throws ConfigError for bad syntax, an unknown or repeated key, a value out of range: "NAME:LINE: KEY: what is wrong"
+/// @throws ConfigError for bad syntax, an unknown or repeated key, a value out of range: "NAME:LINE: KEY: what is
+/// wrong"
 void apply_yaml(Config& config, const std::string& yaml, const std::string& name);
 
 /// As apply_yaml, of a file. @throws ConfigError also when it cannot be read

@@ -30,7 +30,9 @@ class OptionCollector {
     void choice(const char* key, int& member, std::vector<std::string> names, const char* effect) {
         add({path(key), &member, {}, {}, std::move(names), effect});
     }
-    void text(const char* key, std::string& member, const char* effect) { add({path(key), &member, {}, {}, {}, effect}); }
+    void text(const char* key, std::string& member, const char* effect) {
+        add({path(key), &member, {}, {}, {}, effect});
+    }
     template <std::size_t N>
     void vector(const char* key, std::array<double, N>& member, Range range, const char* unit, const char* effect) {
         add({path(key), std::span<double>(member), range, unit, {}, effect});
@@ -83,7 +85,9 @@ bool parse_flag(std::string_view text) {
     throw ConfigError(fmt::format("'{}' is neither true nor false", text));
 }
 
-std::string real_to_yaml(double value) { return fmt::format("{}", value); }
+std::string real_to_yaml(double value) {
+    return fmt::format("{}", value);
+}
 
 template <class Range_>
 std::string reals_to_yaml(const Range_& values) {
@@ -200,7 +204,8 @@ std::string nearest_key(const OptionList& options, std::string_view key) {
         if (option == nullptr) continue;
         // A right name in the wrong group is nearer than a wrong name in the right one.
         const std::string_view known = option->key;
-        const std::size_t distance = std::min(edit_distance(known, key), 1 + edit_distance(known.substr(known.rfind('.') + 1), leaf));
+        const std::size_t distance =
+            std::min(edit_distance(known, key), 1 + edit_distance(known.substr(known.rfind('.') + 1), leaf));
         if (distance < best_distance) {
             best_distance = distance;
             best = option->key;

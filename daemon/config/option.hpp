@@ -1,14 +1,14 @@
 // The configuration as a flat list of named values, for everything that treats all keys alike.
 #pragma once
 
-#include "core/types/parameter.hpp"
-
 #include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <variant>
 #include <vector>
+
+#include "core/types/parameter.hpp"
 
 namespace dlod::daemon {
 
@@ -25,7 +25,7 @@ class Option {
   public:
     using Value = std::variant<int*, double*, bool*, std::string*, std::span<double>, std::vector<double>*>;
 
-    std::string key;                   ///< full, "tracking.alpha"
+    std::string key;  ///< full, "tracking.alpha"
     Value value;
     Range range;                       ///< of numbers
     std::string unit;                  ///< of numbers

@@ -10,12 +10,9 @@ namespace dlod::daemon {
 const std::vector<Preset>& presets() {
     // The defaults are those of an OS0-128. With fewer rows every row counts for the registration.
     static const std::vector<Preset> table = {
-        {"OS0", 64, {"subsampling.row_step=1"}},
-        {"OS0", 32, {"subsampling.row_step=1", "subsampling.column_step=3"}},
-        {"OS1", 64, {"subsampling.row_step=1"}},
-        {"OS1", 32, {"subsampling.row_step=1", "subsampling.column_step=3"}},
-        {"OS2", 64, {"subsampling.row_step=1"}},
-        {"OS2", 32, {"subsampling.row_step=1", "subsampling.column_step=3"}},
+        {"OS0", 64, {"subsampling.row_step=1"}}, {"OS0", 32, {"subsampling.row_step=1", "subsampling.column_step=3"}},
+        {"OS1", 64, {"subsampling.row_step=1"}}, {"OS1", 32, {"subsampling.row_step=1", "subsampling.column_step=3"}},
+        {"OS2", 64, {"subsampling.row_step=1"}}, {"OS2", 32, {"subsampling.row_step=1", "subsampling.column_step=3"}},
     };
     return table;
 }

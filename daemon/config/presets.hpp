@@ -11,7 +11,7 @@ struct SensorInfo;
 namespace dlod::daemon {
 
 struct Preset {
-    std::string product;                ///< "OS0", "OS1", "OS2"
+    std::string product;  ///< "OS0", "OS1", "OS2"
     int rows;
     std::vector<std::string> settings;  ///< "key=value"
 };

@@ -1,9 +1,9 @@
 #pragma once
 
-#include "core/map/global_map.hpp"
-
 #include <filesystem>
 #include <span>
+
+#include "core/map/global_map.hpp"
 
 namespace dlod::daemon {
 

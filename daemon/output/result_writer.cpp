@@ -11,15 +11,19 @@ namespace {
 std::filesystem::path created(const std::filesystem::path& folder) {
     std::error_code error;
     std::filesystem::create_directories(folder, error);
-    if (error) throw OutputError(fmt::format("{}: cannot create the output folder: {}", folder.string(), error.message()));
+    if (error)
+        throw OutputError(fmt::format("{}: cannot create the output folder: {}", folder.string(), error.message()));
     return folder;
 }
 
 const char* state_name(DynamicState state) {
     switch (state) {
-        case DynamicState::kStatic: return "static";
-        case DynamicState::kDynamic: return "dynamic";
-        case DynamicState::kUndefined: break;
+        case DynamicState::kStatic:
+            return "static";
+        case DynamicState::kDynamic:
+            return "dynamic";
+        case DynamicState::kUndefined:
+            break;
     }
     return "undefined";
 }
@@ -29,7 +33,9 @@ std::span<const std::byte> bytes_of(const Image<T>& image) {
     return std::as_bytes(std::span(image.data(), image.size()));
 }
 
-std::string_view text_of(const fmt::memory_buffer& buffer) { return {buffer.data(), buffer.size()}; }
+std::string_view text_of(const fmt::memory_buffer& buffer) {
+    return {buffer.data(), buffer.size()};
+}
 
 }  // namespace
 
@@ -63,8 +69,8 @@ void ResultWriter::write_pose(const Frame& frame) {
     const Eigen::Quaterniond q(frame.odometry.T_world_sensor.linear());
     line_.clear();
     fmt::format_to(std::back_inserter(line_), "{}.{:09} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n",
-                   frame.header.stamp_ns / 1'000'000'000, frame.header.stamp_ns % 1'000'000'000, t.x(), t.y(), t.z(), q.x(),
-                   q.y(), q.z(), q.w());
+                   frame.header.stamp_ns / 1'000'000'000, frame.header.stamp_ns % 1'000'000'000, t.x(), t.y(), t.z(),
+                   q.x(), q.y(), q.z(), q.w());
     trajectory_.write(text_of(line_));
 }
 
@@ -72,12 +78,13 @@ void ResultWriter::write_tracks(const Frame& frame) {
     line_.clear();
     for (const Track& track : frame.detection.tracks) {
         const auto& box = track.box;
-        fmt::format_to(std::back_inserter(line_),
-                       "{},{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{},{},{:.6f}\n",
-                       frame.header.sequence, frame.header.stamp_ns, track.id, state_name(track.state), box.center_m.x(),
-                       box.center_m.y(), box.center_m.z(), box.yaw_rad, box.size_m.x(), box.size_m.y(), box.size_m.z(),
-                       track.velocity_mps.x(), track.velocity_mps.y(), track.velocity_mps.z(), track.points, track.hits,
-                       track.residual_m);
+        fmt::format_to(
+            std::back_inserter(line_),
+            "{},{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{},{},{:.6f}\n",
+            frame.header.sequence, frame.header.stamp_ns, track.id, state_name(track.state), box.center_m.x(),
+            box.center_m.y(), box.center_m.z(), box.yaw_rad, box.size_m.x(), box.size_m.y(), box.size_m.z(),
+            track.velocity_mps.x(), track.velocity_mps.y(), track.velocity_mps.z(), track.points, track.hits,
+            track.residual_m);
     }
     tracks_.write(text_of(line_));
 }

@@ -1,14 +1,14 @@
 // The output folder of a run: poses, frames, labels, instances, tracks and map.
 #pragma once
 
-#include "core/map/global_map.hpp"
-#include "daemon/output/output_file.hpp"
-#include "daemon/pipeline/pipeline_frame.hpp"
-
 #include <fmt/format.h>
 
 #include <filesystem>
 #include <span>
+
+#include "core/map/global_map.hpp"
+#include "daemon/output/output_file.hpp"
+#include "daemon/pipeline/pipeline_frame.hpp"
 
 namespace dlod::daemon {
 

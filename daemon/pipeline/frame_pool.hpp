@@ -1,9 +1,9 @@
 #pragma once
 
-#include "daemon/pipeline/stage.hpp"
-
 #include <memory>
 #include <vector>
+
+#include "daemon/pipeline/stage.hpp"
 
 namespace dlod::daemon {
 

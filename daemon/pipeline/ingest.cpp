@@ -12,7 +12,8 @@ Ingest::Ingest(driver::PacketSource& source, const driver::SensorInfo& sensor, c
       intake_(intake),
       events_(events),
       options_(options),
-      builder_(sensor, config, [this] { return acquire(); }, [this](Frame* frame) { emit(frame); }) {}
+      builder_(
+          sensor, config, [this] { return acquire(); }, [this](Frame* frame) { emit(frame); }) {}
 
 void Ingest::run() {
     const std::uint64_t before = emitted_frames();

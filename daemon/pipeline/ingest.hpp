@@ -1,15 +1,15 @@
 // Packets from the source into frames, frames into the pipeline.
 #pragma once
 
+#include <atomic>
+#include <cstdint>
+#include <functional>
+
 #include "daemon/pipeline/frame_pool.hpp"
 #include "daemon/pipeline/stage.hpp"
 #include "driver/counter.hpp"
 #include "driver/frame_builder.hpp"
 #include "driver/packet_source.hpp"
-
-#include <atomic>
-#include <cstdint>
-#include <functional>
 
 namespace dlod::daemon {
 
@@ -17,8 +17,8 @@ namespace dlod::daemon {
 class Ingest final : public Actor {
   public:
     struct Options {
-        bool live = false;  ///< never wait for a free frame: drop the oldest one that waits
-        bool paced = false; ///< the source waits for packets: that is not counted as time of ingest
+        bool live = false;   ///< never wait for a free frame: drop the oldest one that waits
+        bool paced = false;  ///< the source waits for packets: that is not counted as time of ingest
     };
     /// Called when frames were emitted or the source has ended.
     using Wake = std::function<void()>;
@@ -26,7 +26,9 @@ class Ingest final : public Actor {
     Ingest(driver::PacketSource& source, const driver::SensorInfo& sensor, const driver::FrameBuilderConfig& config,
            FramePool& pool, FrameQueue& out, IntakeStage& intake, EventCount& events, Options options);
 
-    bool ready() const override { return !ended() && pool_.available() >= kFramesAtWork && out_.read_available() < kMaxWaiting; }
+    bool ready() const override {
+        return !ended() && pool_.available() >= kFramesAtWork && out_.read_available() < kMaxWaiting;
+    }
     /// Goes on until a frame was emitted or frames are short.
     void run() override;
     /// Goes on to the end of the source, or until abandon().
@@ -41,7 +43,8 @@ class Ingest final : public Actor {
     std::uint64_t emitted_frames() const { return emitted_.load(); }
     /// The frame builder's; from any thread.
     const driver::FrameBuilderCounters& counters() const { return builder_.counters(); }
-    /// Counts the source's answers, also those without packets: it stands still where the source hangs. From any thread.
+    /// Counts the source's answers, also those without packets: it stands still where the source hangs. From any
+    /// thread.
     std::uint64_t steps() const { return steps_.value(); }
     /// CLOCK_MONOTONIC of the last packet; 0: none yet. From any thread.
     std::int64_t last_packet_ns() const { return last_packet_ns_.load(std::memory_order_relaxed); }

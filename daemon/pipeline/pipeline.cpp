@@ -23,8 +23,9 @@ int make_event_descriptor() {
 
 }  // namespace
 
-Pipeline::Pipeline(const driver::SensorInfo& sensor, const MethodConfig& method, const driver::FrameBuilderConfig& frames,
-                   driver::PacketSource& source, FrameSinks sinks, PipelineOptions options)
+Pipeline::Pipeline(const driver::SensorInfo& sensor, const MethodConfig& method,
+                   const driver::FrameBuilderConfig& frames, driver::PacketSource& source, FrameSinks sinks,
+                   PipelineOptions options)
     : geometry_(sensor.model),
       method_(sensor.model, method),
       source_(source),
@@ -38,10 +39,12 @@ Pipeline::Pipeline(const driver::SensorInfo& sensor, const MethodConfig& method,
       to_publish_(kQueueLength),
       to_map_(kQueueLength),
       to_write_(kQueueLength),
-      prepare_(to_prepare_, to_odometry_, pool_.dropped(), options_.live ? static_cast<std::size_t>(options_.waiting_frames) : 0,
+      prepare_(to_prepare_, to_odometry_, pool_.dropped(),
+               options_.live ? static_cast<std::size_t>(options_.waiting_frames) : 0,
                [this](PipelineFrame& frame) { prepare(frame); }),
-      odometry_(to_odometry_, to_detection_, [this](PipelineFrame& frame) { estimate_pose(frame); },
-                [this] { return detection_.completed() + kFeedbackDelay > odometry_.completed(); }),
+      odometry_(
+          to_odometry_, to_detection_, [this](PipelineFrame& frame) { estimate_pose(frame); },
+          [this] { return detection_.completed() + kFeedbackDelay > odometry_.completed(); }),
       detection_(to_detection_, to_publish_, [this](PipelineFrame& frame) { detect_and_track(frame); }),
       publish_(to_publish_, to_map_, [this](PipelineFrame& frame) { publish(frame); }),
       map_(to_map_, to_write_, [this](PipelineFrame& frame) { update_map(frame); }),
@@ -123,7 +126,8 @@ void Pipeline::detect_and_track(PipelineFrame& frame) {
     };
     timed(Step::kDetection, [&] { method_.detect(frame); });
     timed(Step::kTracking, [&] { method_.track(frame); });
-    timed(Step::kRemoval, [&] { method_.remove_dynamic_points(frame, feedback_[detection_.completed() % kFeedbackDelay]); });
+    timed(Step::kRemoval,
+          [&] { method_.remove_dynamic_points(frame, feedback_[detection_.completed() % kFeedbackDelay]); });
 }
 
 void Pipeline::publish(PipelineFrame& frame) {

@@ -7,17 +7,17 @@
 // and never takes an older or a newer one. So the results depend on nothing but the frames.
 #pragma once
 
-#include "core/dynamic_lidar_odometry.hpp"
-#include "daemon/pipeline/frame_pool.hpp"
-#include "daemon/pipeline/ingest.hpp"
-#include "daemon/pipeline/stage.hpp"
-#include "driver/geometry.hpp"
-
 #include <array>
 #include <functional>
 #include <memory>
 #include <thread>
 #include <vector>
+
+#include "core/dynamic_lidar_odometry.hpp"
+#include "daemon/pipeline/frame_pool.hpp"
+#include "daemon/pipeline/ingest.hpp"
+#include "daemon/pipeline/stage.hpp"
+#include "driver/geometry.hpp"
 
 namespace dlod::daemon {
 
@@ -31,9 +31,9 @@ struct FrameSinks {
 
 struct PipelineOptions {
     int threads = 2;
-    int waiting_frames = 2;   ///< live: more than these are dropped, oldest first
-    bool live = false;        ///< receive on a thread of its own, never wait for the stages
-    bool paced = false;       ///< replay in time: the source waits for packets, on a thread of its own
+    int waiting_frames = 2;  ///< live: more than these are dropped, oldest first
+    bool live = false;       ///< receive on a thread of its own, never wait for the stages
+    bool paced = false;      ///< replay in time: the source waits for packets, on a thread of its own
     std::function<void(int)> on_thread_start = {};  ///< on each thread, with its number; the last one receives
 };
 

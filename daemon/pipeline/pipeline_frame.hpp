@@ -1,9 +1,9 @@
 #pragma once
 
+#include <cstdint>
+
 #include "core/types/frame.hpp"
 #include "daemon/pipeline/stage_times.hpp"
-
-#include <cstdint>
 
 namespace dlod::daemon {
 

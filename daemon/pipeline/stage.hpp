@@ -1,13 +1,12 @@
 // A stage of the pipeline: takes frames from one queue, works on them, hands them to the next.
 #pragma once
 
-#include "daemon/pipeline/pipeline_frame.hpp"
-#include "daemon/pipeline/worker_pool.hpp"
-
 #include <boost/lockfree/spsc_queue.hpp>
-
 #include <cstdint>
 #include <functional>
+
+#include "daemon/pipeline/pipeline_frame.hpp"
+#include "daemon/pipeline/worker_pool.hpp"
 
 namespace dlod::daemon {
 

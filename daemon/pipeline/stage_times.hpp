@@ -11,9 +11,9 @@ namespace dlod::daemon {
 
 /// The steps that are timed, in the order in which a frame passes them.
 enum class Step : std::uint8_t {
-    kIngest,        ///< decoding its packets into the frame
-    kGeometry,      ///< xyz of every pixel
-    kSubsampling,   ///< points and normals for the registration
+    kIngest,       ///< decoding its packets into the frame
+    kGeometry,     ///< xyz of every pixel
+    kSubsampling,  ///< points and normals for the registration
     kGround,
     kSegmentation,
     kOdometry,
@@ -22,12 +22,12 @@ enum class Step : std::uint8_t {
     kRemoval,
     kPublish,
     kMap,
-    kWrite,         ///< result files; of this frame's own row only the frame before's is known
+    kWrite,  ///< result files; of this frame's own row only the frame before's is known
 };
 inline constexpr std::size_t kStepCount = 12;
 inline constexpr std::array<const char*, kStepCount> kStepNames = {
-    "ingest", "geometry", "subsampling", "ground", "segmentation", "odometry",
-    "detection", "tracking", "removal", "publish", "map", "write"};
+    "ingest",    "geometry", "subsampling", "ground",  "segmentation", "odometry",
+    "detection", "tracking", "removal",     "publish", "map",          "write"};
 
 /// Milliseconds a step, elapsed and of the thread's CPU time.
 struct StageTimes {
@@ -41,7 +41,8 @@ class StepTimer {
     StepTimer(StageTimes& times, Step step) : times_(times), step_(static_cast<std::size_t>(step)) {}
     ~StepTimer() {
         times_.wall_ms[step_] += static_cast<float>(1e-6 * static_cast<double>(now_ns(CLOCK_MONOTONIC) - wall_ns_));
-        times_.cpu_ms[step_] += static_cast<float>(1e-6 * static_cast<double>(now_ns(CLOCK_THREAD_CPUTIME_ID) - cpu_ns_));
+        times_.cpu_ms[step_] +=
+            static_cast<float>(1e-6 * static_cast<double>(now_ns(CLOCK_THREAD_CPUTIME_ID) - cpu_ns_));
     }
     StepTimer(const StepTimer&) = delete;
     StepTimer& operator=(const StepTimer&) = delete;

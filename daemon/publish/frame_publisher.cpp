@@ -8,7 +8,9 @@ namespace dlod::daemon {
 namespace {
 
 /// LCM counts the channel's name and its end against the datagram.
-std::size_t room_for(const std::string& channel) { return kLargestDatagram - channel.size() - 1; }
+std::size_t room_for(const std::string& channel) {
+    return kLargestDatagram - channel.size() - 1;
+}
 
 template <class Message>
 std::size_t encoded_size(const Message& message) {
@@ -30,7 +32,8 @@ std::size_t tracks_that_fit(std::size_t room) {
 }
 
 std::int32_t flags_of(const OdometryResult& odometry) {
-    static_assert(pose_t::IMU_USED == 2 * OdometryResult::kImuUsed && pose_t::IMU_FAULTY == 2 * OdometryResult::kImuFaulty);
+    static_assert(pose_t::IMU_USED == 2 * OdometryResult::kImuUsed &&
+                  pose_t::IMU_FAULTY == 2 * OdometryResult::kImuFaulty);
     // The message's flags are the odometry's, moved up by one bit for VALID.
     return static_cast<std::int32_t>(odometry.flags << 1U) | (odometry.valid ? pose_t::VALID : 0);
 }

@@ -1,22 +1,21 @@
 // A frame's results as LCM messages: pose, dynamic mask, tracks.
 #pragma once
 
-#include "core/types/frame.hpp"
-#include "daemon/publish/message_sender.hpp"
-
+#include <Eigen/Geometry>
+#include <cstdint>
 #include <dlod/dynamic_mask_t.hpp>
 #include <dlod/pose_t.hpp>
 #include <dlod/tracks_t.hpp>
-
-#include <Eigen/Geometry>
-
-#include <cstdint>
 #include <string>
 #include <vector>
 
+#include "core/types/frame.hpp"
+#include "daemon/publish/message_sender.hpp"
+
 namespace dlod::daemon {
 
-/// Encodes into buffers made once and publishes; every message fits in one datagram, whatever the scene. For one thread.
+/// Encodes into buffers made once and publishes; every message fits in one datagram, whatever the scene. For one
+/// thread.
 class FramePublisher {
   public:
     /// @param T_base_sensor where the sensor sits on the robot

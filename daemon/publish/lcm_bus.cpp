@@ -8,13 +8,16 @@ namespace dlod::daemon {
 LcmBus::LcmBus(const std::string& url) : lcm_(::lcm_create(url.empty() ? nullptr : url.c_str())) {
     if (lcm_ == nullptr) {
         throw MessageBusError(fmt::format(
-            "lcm.url '{}': LCM cannot be opened. Is the URL right, and is there a route for multicast? Without a network: "
+            "lcm.url '{}': LCM cannot be opened. Is the URL right, and is there a route for multicast? Without a "
+            "network: "
             "ip link set lo multicast on; ip route add 224.0.0.0/4 dev lo. To publish nothing: lcm.url none",
             url));
     }
 }
 
-LcmBus::~LcmBus() { ::lcm_destroy(lcm_); }
+LcmBus::~LcmBus() {
+    ::lcm_destroy(lcm_);
+}
 
 bool LcmBus::publish(const std::string& channel, std::span<const std::byte> message) {
     return ::lcm_publish(lcm_, channel.c_str(), message.data(), static_cast<unsigned>(message.size())) == 0;

@@ -1,9 +1,9 @@
 #pragma once
 
-#include "daemon/publish/message_bus.hpp"
-
 #include <stdexcept>
 #include <string>
+
+#include "daemon/publish/message_bus.hpp"
 
 struct _lcm_t;
 
@@ -15,8 +15,8 @@ class MessageBusError : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-/// LCM, for publishing only: its receiving side tests itself for up to ten seconds where multicast does not work, and is
-/// made only for who subscribes.
+/// LCM, for publishing only: its receiving side tests itself for up to ten seconds where multicast does not work, and
+/// is made only for who subscribes.
 class LcmBus final : public MessageBus {
   public:
     /// @param url LCM provider, "udpm://239.255.76.67:7667?ttl=1"; empty: LCM's default

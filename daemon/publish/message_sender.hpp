@@ -1,12 +1,12 @@
 #pragma once
 
-#include "daemon/publish/message_bus.hpp"
-
 #include <atomic>
 #include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
+
+#include "daemon/publish/message_bus.hpp"
 
 namespace dlod::daemon {
 

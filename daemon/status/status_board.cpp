@@ -50,10 +50,14 @@ std::int64_t peak_bytes() {
 
 const char* health_name(std::int8_t health) {
     switch (health) {
-        case status_t::OK: return "ok";
-        case status_t::WAITING: return "waiting";
-        case status_t::DEGRADED: return "degraded";
-        default: return "fault";
+        case status_t::OK:
+            return "ok";
+        case status_t::WAITING:
+            return "waiting";
+        case status_t::DEGRADED:
+            return "degraded";
+        default:
+            return "fault";
     }
 }
 
@@ -111,7 +115,9 @@ std::uint64_t StatusBoard::counter(const std::string& name) const {
 
 void StatusBoard::compose_rates(std::int64_t now_ns) {
     const double seconds = std::max(1e-9 * static_cast<double>(now_ns - last_compose_ns_), 1e-3);
-    const auto rate = [&](const char* name) { return static_cast<double>(counter(name) - previous_counters_[name]) / seconds; };
+    const auto rate = [&](const char* name) {
+        return static_cast<double>(counter(name) - previous_counters_[name]) / seconds;
+    };
     status_.packet_rate = rate("lidar_packets");
     status_.frame_rate = rate("frames");
     status_.pose_rate = static_cast<double>(poses_ - previous_poses_) / seconds;
@@ -155,8 +161,8 @@ void StatusBoard::compose_health(std::int64_t last_packet_ns, std::int64_t now_n
 }
 
 std::string StatusBoard::one_line() const {
-    std::string line = fmt::format("{}: {:.1f} frames/s, {:.1f} poses/s", health_name(status_.health), status_.frame_rate,
-                                   status_.pose_rate);
+    std::string line = fmt::format("{}: {:.1f} frames/s, {:.1f} poses/s", health_name(status_.health),
+                                   status_.frame_rate, status_.pose_rate);
     if (status_.pose_age >= 0) line += fmt::format(", pose {} ms old", status_.pose_age / 1000);
     if (!status_.health_text.empty()) line += "; " + status_.health_text;
     return line;

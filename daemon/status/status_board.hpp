@@ -1,18 +1,17 @@
 // Gathers what the operator must know, and makes the message on DLOD_STATUS and the line for systemd of it.
 #pragma once
 
-#include "daemon/pipeline/pipeline_frame.hpp"
-#include "daemon/status/latency_window.hpp"
-
-#include <dlod/status_t.hpp>
-
 #include <array>
 #include <cstdint>
+#include <dlod/status_t.hpp>
 #include <map>
 #include <mutex>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "daemon/pipeline/pipeline_frame.hpp"
+#include "daemon/status/latency_window.hpp"
 
 namespace dlod::daemon {
 
@@ -30,7 +29,8 @@ class StatusBoard {
 
     /// Call it once a second, on one thread: rates are over the time since the call before.
     /// @param last_packet_ns CLOCK_MONOTONIC, 0 where none came yet
-    const status_t& compose(const CounterList& counters, std::int64_t last_packet_ns, std::int64_t now_ns, std::int64_t utime);
+    const status_t& compose(const CounterList& counters, std::int64_t last_packet_ns, std::int64_t now_ns,
+                            std::int64_t utime);
 
     /// The composed status in one line.
     std::string one_line() const;
