@@ -6,7 +6,7 @@
 #include <numbers>
 #include <set>
 
-#include "tools/eval/assignment.hpp"
+#include "core/tracking/hungarian.hpp"
 #include "tools/eval/mask_score.hpp"
 
 namespace dlod::tools {
@@ -52,6 +52,22 @@ class Mean {
   private:
     double sum_ = 0.0;
     int count_ = 0;
+};
+
+/// What it costs to assign a row to a column.
+class CostTable {
+  public:
+    CostTable(std::size_t rows, std::size_t columns, double value)
+        : rows_(rows), columns_(columns), values_(rows * columns, value) {}
+    double& at(std::size_t row, std::size_t column) { return values_[row * columns_ + column]; }
+    /// The column of each row at the least sum of costs, -1 where a row has none.
+    std::vector<int> assignment() const {
+        return Hungarian().solve(values_, static_cast<int>(rows_), static_cast<int>(columns_));
+    }
+
+  private:
+    std::size_t rows_, columns_;
+    std::vector<double> values_;
 };
 
 /// Walks over the frames and keeps the counts.
@@ -104,21 +120,19 @@ class TrackingScorer {
     void match_frame() {
         matches_.clear();
         if (objects_.empty() || tracks_.empty()) return;
-        Eigen::MatrixXd cost = Eigen::MatrixXd::Constant(static_cast<Eigen::Index>(objects_.size()),
-                                                         static_cast<Eigen::Index>(tracks_.size()), kForbidden);
+        CostTable cost(objects_.size(), tracks_.size(), kForbidden);
         for (std::size_t a = 0; a < objects_.size(); ++a) {
             const auto last = last_track_.find(objects_[a].id);
             for (std::size_t b = 0; b < tracks_.size(); ++b) {
                 const double distance = ground_distance(objects_[a].center_m, tracks_[b].box.center_m);
                 if (distance > gate_m(objects_[a])) continue;
                 const bool same = last != last_track_.end() && last->second == tracks_[b].id;
-                cost(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) =
-                    distance - (same ? kBonusOfSameTrack_m : 0.0);
+                cost.at(a, b) = distance - (same ? kBonusOfSameTrack_m : 0.0);
             }
         }
-        const std::vector<int> assigned = assign(cost);
+        const std::vector<int> assigned = cost.assignment();
         for (std::size_t a = 0; a < objects_.size(); ++a) {
-            if (assigned[a] < 0 || cost(static_cast<Eigen::Index>(a), assigned[a]) >= 0.5 * kForbidden) continue;
+            if (assigned[a] < 0 || cost.at(a, static_cast<std::size_t>(assigned[a])) >= 0.5 * kForbidden) continue;
             const auto b = static_cast<std::size_t>(assigned[a]);
             matches_.push_back({a, b, ground_distance(objects_[a].center_m, tracks_[b].box.center_m)});
         }
@@ -174,19 +188,17 @@ class TrackingScorer {
     /// Frames in which objects and tracks are together under the best one-to-one pairing of identities over the run.
     int identity_true_positives() const {
         if (frames_of_object_.empty() || frames_of_track_.empty()) return 0;
-        std::map<int, Eigen::Index> rows;
-        std::map<std::uint32_t, Eigen::Index> columns;
-        for (const auto& [id, frames] : frames_of_object_) rows.emplace(id, static_cast<Eigen::Index>(rows.size()));
-        for (const auto& [id, frames] : frames_of_track_)
-            columns.emplace(id, static_cast<Eigen::Index>(columns.size()));
-        Eigen::MatrixXd cost =
-            Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(rows.size()), static_cast<Eigen::Index>(columns.size()));
+        std::map<int, std::size_t> rows;
+        std::map<std::uint32_t, std::size_t> columns;
+        for (const auto& [id, frames] : frames_of_object_) rows.emplace(id, rows.size());
+        for (const auto& [id, frames] : frames_of_track_) columns.emplace(id, columns.size());
+        CostTable cost(rows.size(), columns.size(), 0.0);
         for (const auto& [pair, frames] : frames_together_)
-            cost(rows.at(pair.first), columns.at(pair.second)) = -frames;
-        const std::vector<int> assigned = assign(cost);
+            cost.at(rows.at(pair.first), columns.at(pair.second)) = -frames;
+        const std::vector<int> assigned = cost.assignment();
         double together = 0.0;
         for (std::size_t a = 0; a < assigned.size(); ++a) {
-            if (assigned[a] >= 0) together -= cost(static_cast<Eigen::Index>(a), assigned[a]);
+            if (assigned[a] >= 0) together -= cost.at(a, static_cast<std::size_t>(assigned[a]));
         }
         return static_cast<int>(together);
     }
