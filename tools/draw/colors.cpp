@@ -7,13 +7,13 @@ namespace dlod::tools {
 const cv::Scalar& color_of(DynamicState state) {
     switch (state) {
         case DynamicState::kDynamic:
-            return kDynamic;
+            return kDynamicColor;
         case DynamicState::kStatic:
-            return kStatic;
+            return kStaticColor;
         case DynamicState::kUndefined:
             break;
     }
-    return kUndecided;
+    return kUndecidedColor;
 }
 
 cv::Scalar color_of_id(std::uint32_t id) {

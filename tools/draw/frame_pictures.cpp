@@ -67,8 +67,8 @@ cv::Mat draw_range_image(const Frame& frame, const ImageProjection& projection) 
             const double gray = brightness(range(r, c));
             const auto kind = static_cast<PixelLabel>(label(r, c));
             cv::Scalar color(gray, gray, gray);
-            if (kind == PixelLabel::kDynamic) color = 0.25 * color + 0.75 * kDynamic;
-            if (kind == PixelLabel::kUndecided) color = 0.4 * color + 0.6 * kUndecided;
+            if (kind == PixelLabel::kDynamic) color = 0.25 * color + 0.75 * kDynamicColor;
+            if (kind == PixelLabel::kUndecided) color = 0.4 * color + 0.6 * kUndecidedColor;
             for (int channel = 0; channel < 3; ++channel)
                 image(r, c)[channel] = cv::saturate_cast<std::uint8_t>(color[channel]);
         }
@@ -89,11 +89,13 @@ cv::Mat draw_residual_image(const Image<float>& residual_m, double scale_m) {
             level(r, c) = cv::saturate_cast<std::uint8_t>(255.0 * static_cast<double>(residual_m(r, c)) / scale_m);
         }
     }
+    // Only a grid of pixels is registered: each is drawn as large as its share of the grid.
+    cv::dilate(level, level, cv::getStructuringElement(cv::MORPH_RECT, {5, 3}));
     cv::Mat colored;
     cv::applyColorMap(level, colored, cv::COLORMAP_INFERNO);
     cv::Mat picture = enlarged(colored);
     caption(picture, "residual image: 0 (dark) to " + std::to_string(static_cast<int>(std::lround(100.0 * scale_m))) +
-                         " cm (bright) from the local map");
+                         " cm (bright) from the local map; registered pixels, enlarged");
     return picture;
 }
 

@@ -3,8 +3,10 @@
 #include <cstdio>
 #include <exception>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "daemon/commands/load_config.hpp"
+#include "tools/draw/colors.hpp"
 #include "tools/draw/frame_pictures.hpp"
 #include "tools/draw/map_picture.hpp"
 #include "tools/draw/replayed_frame.hpp"
@@ -14,11 +16,11 @@ namespace dlod::tools {
 namespace {
 
 struct Arguments {
-    std::filesystem::path run, out, truth, capture, metadata, config;
+    std::filesystem::path run, beside, out, truth, capture, metadata, config;
     std::vector<std::string> settings;
     std::int64_t frame = -1;
     double residual_scale_m = 0.5;
-    std::string title;
+    std::string title, beside_title;
 };
 
 void save(const Arguments& arguments, const char* name, const cv::Mat& picture) {
@@ -44,7 +46,8 @@ std::int64_t busiest_frame(const std::filesystem::path& run) {
     return best;
 }
 
-void draw_frame(const Arguments& arguments, const RunOutput& run) {
+void draw_frame(const Arguments& arguments) {
+    const RunOutput run(arguments.run);
     const driver::SensorInfo sensor = driver::load_metadata(arguments.metadata);
     daemon::ConfigSources sources;
     if (!arguments.config.empty()) sources.file = arguments.config;
@@ -58,17 +61,29 @@ void draw_frame(const Arguments& arguments, const RunOutput& run) {
     save(arguments, "residual_image.png", draw_residual_image(replayed.residual_m, arguments.residual_scale_m));
 }
 
-void draw_map(const Arguments& arguments, const RunOutput& run) {
-    const auto file = arguments.run / "map.pcd";
+cv::Mat draw_map(const std::filesystem::path& folder, const std::filesystem::path& truth_folder,
+                 const std::string& title) {
+    const RunOutput run(folder);
+    const auto file = folder / "map.pcd";
     const PointList map = std::filesystem::exists(file) ? read_pcd(file) : PointList{};
-    if (arguments.truth.empty()) {
-        save(arguments, "from_above.png", draw_from_above(run, map, std::nullopt, arguments.title));
-        return;
-    }
-    const Truth truth(arguments.truth);
+    const std::string caption = title.empty() ? folder.string() : title;
+    if (truth_folder.empty()) return draw_from_above(run, map, std::nullopt, caption);
+    const Truth truth(truth_folder);
     const Eigen::Isometry3d T_true_run = score_trajectory(truth, run.trajectory).T_true_run;
-    save(arguments, "from_above.png",
-         draw_from_above(run, map, TruePaths{truth, T_true_run.inverse()}, arguments.title));
+    return draw_from_above(run, map, TruePaths{truth, T_true_run.inverse()}, caption);
+}
+
+void draw_maps(const Arguments& arguments) {
+    cv::Mat picture = draw_map(arguments.run, arguments.truth, arguments.title);
+    if (!arguments.beside.empty()) {
+        cv::Mat beside = draw_map(arguments.beside, arguments.truth, arguments.beside_title);
+        const int rows = std::max(picture.rows, beside.rows);
+        for (auto* side : {&picture, &beside}) {
+            cv::copyMakeBorder(*side, *side, 0, rows - side->rows, 6, 6, cv::BORDER_CONSTANT, kWhite);
+        }
+        cv::hconcat(picture, beside, picture);
+    }
+    save(arguments, "from_above.png", picture);
 }
 
 }  // namespace
@@ -94,15 +109,16 @@ int main(int argc, char** argv) {
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
     app.add_option("--title", arguments.title, "caption of the view from above; default: RUN_DIR");
+    app.add_option("--beside", arguments.beside, "output folder of another run, drawn from above beside the first")
+        ->check(CLI::ExistingDirectory);
+    app.add_option("--beside-title", arguments.beside_title, "its caption; default: its folder");
     CLI11_PARSE(app, argc, argv);
-    if (arguments.title.empty()) arguments.title = arguments.run.string();
     if (arguments.metadata.empty())
         arguments.metadata = std::filesystem::path(arguments.capture).replace_extension(".json");
     try {
         std::filesystem::create_directories(arguments.out);
-        const RunOutput run(arguments.run);
-        draw_map(arguments, run);
-        if (!arguments.capture.empty()) draw_frame(arguments, run);
+        draw_maps(arguments);
+        if (!arguments.capture.empty()) draw_frame(arguments);
         return 0;
     } catch (const std::exception& error) {
         std::fprintf(stderr, "dlod-draw: %s\n", error.what());

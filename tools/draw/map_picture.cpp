@@ -168,8 +168,8 @@ cv::Mat draw_from_above(const RunOutput& run, const PointList& map, const std::o
     const View view(map, trajectory);
     cv::Mat picture(view.size(), CV_8UC3, kWhite);
     draw_grid(picture, view);
+    if (paths) draw_true_paths(picture, view, *paths);  // beneath the points: ghosts along them stay visible
     draw_points(picture, view, map);
-    if (paths) draw_true_paths(picture, view, *paths);
     draw_tracks(picture, view, run);
     draw_path(picture, view, trajectory, kRunPath, 2);
     cv::circle(picture, view.at(trajectory.back()), 6, kRunPath, cv::FILLED, cv::LINE_AA);

@@ -2,14 +2,33 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
+#include <memory>
+#include <stdexcept>
+#include <vector>
 
 #include "tools/eval/evaluation.hpp"
+
+namespace {
+
+/// A table of the pose errors over the frames, for plots.
+void write_errors(const std::string& file, const std::vector<dlod::tools::PoseError>& errors) {
+    std::unique_ptr<FILE, int (*)(FILE*)> out(std::fopen(file.c_str(), "w"), std::fclose);
+    if (!out) throw std::runtime_error(file + ": cannot be written");
+    std::fputs("time_s,position_error_m,rotation_error_deg\n", out.get());
+    for (const auto& error : errors) {
+        std::fprintf(out.get(), "%.3f,%.6f,%.6f\n", error.stamp_s - errors.front().stamp_s, error.position_m,
+                     error.rotation_deg);
+    }
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
     CLI::App app{"Scores the output folder of `dlod replay` against a drive's truth: trajectory, masks, tracks, map."};
     std::string truth_folder;
     std::string run_folder;
     dlod::tools::EvaluationOptions options;
+    std::string errors_file;
     bool json = false;
     app.add_option("TRUTH", truth_folder, "truth folder of the drive")->required()->check(CLI::ExistingDirectory);
     app.add_option("OUT", run_folder, "output folder of the replay")->required()->check(CLI::ExistingDirectory);
@@ -18,11 +37,13 @@ int main(int argc, char** argv) {
     app.add_option("--skip", options.skip, "frames of start-up left out of mask and track scores")
         ->check(CLI::NonNegativeNumber)
         ->capture_default_str();
+    app.add_option("--errors", errors_file, "also write the pose errors over time to this CSV file");
     app.add_flag("--json", json, "JSON instead of text");
     CLI11_PARSE(app, argc, argv);
     try {
         const dlod::tools::Truth truth(truth_folder);
         const auto evaluation = evaluate(truth, dlod::tools::RunOutput(run_folder), options);
+        if (!errors_file.empty()) write_errors(errors_file, evaluation.trajectory.errors);
         std::fputs((json ? to_json(evaluation) : to_text(evaluation)).c_str(), stdout);
         return 0;
     } catch (const std::exception& error) {
