@@ -3,7 +3,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <memory>
+#include <string>
 #include <utility>
 
 #include "daemon/clock/host_time_filter.hpp"
@@ -14,6 +18,7 @@
 #include "daemon/pipeline/pipeline.hpp"
 #include "daemon/publish/frame_publisher.hpp"
 #include "daemon/publish/lcm_bus.hpp"
+#include "daemon/recorder/recording_source.hpp"
 #include "daemon/service/log.hpp"
 #include "daemon/service/notifier.hpp"
 #include "daemon/service/signals.hpp"
@@ -36,8 +41,15 @@ driver::UdpOptions udp_options(const SensorConfig& config, const driver::SensorI
     options.multicast_group = config.multicast_group;
     options.multicast_interface = config.interface;
     if (!config.sender.empty()) options.senders = {config.sender};
+    options.share_ports = config.share_ports;
+    options.forward_to = config.forward_to;
     options.receive_buffer_bytes = config.receive_buffer_bytes;
     return options;
+}
+
+std::string text_of(const std::filesystem::path& file) {
+    std::ifstream in(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
 }
 
 std::string describe(const driver::SensorInfo& sensor) {
@@ -80,7 +92,12 @@ ExitCode run(const RunArguments& arguments) {
     for (const auto& warning : sensor.warnings) spdlog::warn("{}", warning);
 
     SignalWaiter signals;
-    driver::UdpSource source(udp_options(config.sensor, sensor));
+    driver::UdpSource socket(udp_options(config.sensor, sensor));
+    std::unique_ptr<RecordingSource> recording;
+    if (!config.recording.folder.empty()) {
+        recording = std::make_unique<RecordingSource>(socket, config.recording, text_of(config.sensor.metadata));
+    }
+    driver::PacketSource& source = recording ? static_cast<driver::PacketSource&>(*recording) : socket;
     std::unique_ptr<LcmBus> bus;
     std::unique_ptr<FramePublisher> publisher;
     std::unique_ptr<MessageSender> status_sender;
@@ -121,7 +138,7 @@ ExitCode run(const RunArguments& arguments) {
     pipeline.start();
     const ServiceNotifier service;
     service.ready("waiting for packets");
-    spdlog::info("receiving on port {}, {}", fmt::join(source.ports(), " and "), describe(sensor));
+    spdlog::info("receiving on port {}, {}", fmt::join(socket.ports(), " and "), describe(sensor));
 
     RepeatedWarnings warnings;
     std::int8_t last_health = status_t::WAITING;

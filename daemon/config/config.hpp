@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/method_config.hpp"
+#include "daemon/recorder/recording_config.hpp"
 #include "driver/frame_builder.hpp"
 
 namespace dlod::daemon {
@@ -19,6 +20,8 @@ struct SensorConfig {
     std::string sender;
     int lidar_port = 0;
     int imu_port = 0;
+    bool share_ports = false;
+    std::string forward_to;
     int receive_buffer_bytes = 16'000'000;
 
     template <class V>
@@ -33,6 +36,9 @@ struct SensorConfig {
                "multicast group to join; empty: the sensor sends to this host alone");
         v.text("interface", interface, "network interface on which the group is joined; empty: the kernel chooses");
         v.text("sender", sender, "only packets from this address are taken; empty: from any");
+        v.flag("share_ports", share_ports, "let other programs read the same ports too; needs a multicast group");
+        v.text("forward_to", forward_to,
+               "address or address:port to which every packet taken is sent on; empty: nowhere");
         v.parameter("receive_buffer_bytes", receive_buffer_bytes, Range{65'536, 1'000'000'000}, "byte",
                     "socket receive buffer to ask for; net.core.rmem_max bounds what the kernel grants");
     }
@@ -123,6 +129,7 @@ struct Config {
     PipelineConfig pipeline;
     LcmConfig lcm;
     OutputConfig output;
+    RecordingConfig recording;
     LogConfig log;
     MethodConfig method;
 
@@ -135,6 +142,7 @@ struct Config {
         v.group("pipeline", pipeline, "threads");
         v.group("lcm", lcm, "messages");
         v.group("output", output, "result files");
+        v.group("recording", recording, "captures of a live run");
         v.group("log", log, "log messages");
         method.visit(v);
     }

@@ -23,7 +23,8 @@ driver::RotationOptions rotation_options(const RecordingConfig& config, const st
 
 }  // namespace
 
-RecordingSource::RecordingSource(driver::PacketSource& source, const RecordingConfig& config, const std::string& metadata)
+RecordingSource::RecordingSource(driver::PacketSource& source, const RecordingConfig& config,
+                                 const std::string& metadata)
     : source_(source),
       rotation_(rotation_options(config, metadata)),
       datagram_(kLargestDatagram),

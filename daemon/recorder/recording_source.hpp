@@ -1,13 +1,8 @@
 // Records what passes from a source to the pipeline, without holding it up.
 #pragma once
 
-#include "core/types/parameter.hpp"
-#include "driver/capture_rotation.hpp"
-#include "driver/packet_source.hpp"
-
-#include <boost/lockfree/spsc_queue.hpp>
-
 #include <atomic>
+#include <boost/lockfree/spsc_queue.hpp>
 #include <condition_variable>
 #include <mutex>
 #include <optional>
@@ -15,26 +10,14 @@
 #include <thread>
 #include <vector>
 
+#include "daemon/recorder/recording_config.hpp"
+#include "driver/capture_rotation.hpp"
+#include "driver/packet_source.hpp"
+
 namespace dlod::daemon {
 
-struct RecordingConfig {
-    std::string folder;
-    int file_megabytes = 1000;
-    int files = 10;
-    int buffer_megabytes = 32;
-
-    template <class V>
-    void visit(V& v) {
-        v.text("folder", folder, "where received packets are recorded as captures (pcap) that can be replayed; empty: nowhere");
-        v.parameter("file_megabytes", file_megabytes, Range{1, 1'000'000}, "MB", "size at which a new file is begun");
-        v.parameter("files", files, Range{1, 100'000}, "files", "files kept at most; the oldest is removed");
-        v.parameter("buffer_megabytes", buffer_megabytes, Range{1, 4096}, "MB",
-                    "packets that may wait for a slow disk; beyond, packets are left out of the recording, never out of the odometry");
-    }
-};
-
-/// Hands on another source's batches and copies them to a thread that writes them to disk. The copy is all that it costs
-/// the caller: when the disk is too slow or full, packets are missing from the recording, counted and reported.
+/// Hands on another source's batches and copies them to a thread that writes them to disk. The copy is all that it
+/// costs the caller: when the disk is too slow or full, packets are missing from the recording, counted and reported.
 class RecordingSource final : public driver::PacketSource {
   public:
     /// `source` must outlive this. `metadata` is the sensor's, as it came.
