@@ -23,7 +23,8 @@ ImageProjection::ImageProjection(const SensorModel& sensor, const Frame& frame, 
 ImageProjection::Beam ImageProjection::beam_of(const Eigen::Vector3d& in_sensor) const {
     const Eigen::Vector3d p = T_lidar_sensor_ * in_sensor;
     const auto& altitude = sensor_.altitude_rad;
-    const double elevation = std::atan2(p.z(), p.head<2>().norm() - static_cast<double>(sensor_.beam_origin_m));
+    const double elevation = std::atan2(p.z() - static_cast<double>(sensor_.beam_origin_height_m),
+                                        p.head<2>().norm() - static_cast<double>(sensor_.beam_origin_m));
     // Beams descend from row 0: the first one at or below the point, and the share of the way to it.
     std::size_t below = 1;
     while (below + 1 < altitude.size() && static_cast<double>(altitude[below]) > elevation) ++below;
