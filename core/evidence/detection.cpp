@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/evidence/completion.hpp"
 #include "core/evidence/evidence_image.hpp"
 #include "core/evidence/occlusion.hpp"
 
@@ -13,8 +14,10 @@ struct Detector::State {
           residuals(sensor),
           evidence(sensor, c.free_space),
           parts(sensor, c.parts),
+          completion(sensor, c.completion),
           row_ends(2 * static_cast<std::size_t>(sensor.height)) {
         counts.reserve(4096);
+        completed.reserve(sensor.pixels());
     }
 
     /// Tested pixels of a segment by what they say.
@@ -27,13 +30,16 @@ struct Detector::State {
     bool is_divided(const Segment& segment, const Counts& c) const;
     void detect(Frame& frame);
     void add(Frame& frame, std::span<const PixelIndex> pixels);
+    void complete(Frame& frame);
 
     DetectionConfig config;
     ResidualImage residuals;
     EvidenceImage evidence;
     MovingParts parts;
+    Completion completion;
     std::vector<Counts> counts;  ///< by segment
     std::vector<int> row_ends;
+    std::vector<PixelIndex> completed;  ///< pixels of the completed detections, swapped with the frame's
 };
 
 void Detector::State::count(const Frame& frame) {
@@ -48,6 +54,8 @@ void Detector::State::count(const Frame& frame) {
 bool Detector::State::is_divided(const Segment& segment, const Counts& c) const {
     constexpr int kFewest = 3;
     if (c.free < kFewest) return false;
+    const Eigen::Vector3f size = segment.max_m - segment.min_m;
+    if (segment.feasible && static_cast<double>(std::max(size.x(), size.y())) <= config.compact_m) return false;
     return !segment.feasible || (c.occupied >= kFewest && c.occupied > config.mixed_share * (c.free + c.occupied));
 }
 
@@ -80,12 +88,6 @@ void Detector::State::add(Frame& frame, std::span<const PixelIndex> pixels) {
     detection.first = static_cast<std::uint32_t>(result.pixels.size());
     detection.count = static_cast<std::uint32_t>(pixels.size());
     result.pixels.insert(result.pixels.end(), pixels.begin(), pixels.end());
-    mark_occlusion(pixels, frame.cloud.range_m, config.occlusion_step_m, row_ends, detection);
-    if (config.use_residual) {
-        const AverageResidual residual = average_residual(pixels, residuals.image());
-        detection.average_residual_m = residual.mean_m;
-        detection.residual_points = residual.count;
-    }
     if (!config.use_free_space) return;
     for (const PixelIndex pixel : pixels) {
         const Evidence e = evidence[pixel];
@@ -93,6 +95,31 @@ void Detector::State::add(Frame& frame, std::span<const PixelIndex> pixels) {
         detection.occupied_points += e == Evidence::kOccupied ? 1 : 0;
         detection.unknown_points += e == Evidence::kUnknown ? 1 : 0;
     }
+}
+
+/// Completes what may be moving and measures what needs the whole mask.
+void Detector::State::complete(Frame& frame) {
+    DetectionResult& result = frame.detection;
+    completion.begin();
+    completion.take(result.pixels);
+    completed.clear();
+    for (Detection& detection : result.detections) {
+        const std::size_t first = completed.size();
+        const auto own = std::span(result.pixels).subspan(detection.first, detection.count);
+        completed.insert(completed.end(), own.begin(), own.end());
+        if (config.use_free_space && detection.free_points > detection.occupied_points) {
+            completion.complete(frame, evidence, first, completed);
+        }
+        detection.first = static_cast<std::uint32_t>(first);
+        detection.count = static_cast<std::uint32_t>(completed.size() - first);
+        const auto pixels = std::span<const PixelIndex>(completed).subspan(first);
+        mark_occlusion(pixels, frame.cloud.range_m, config.occlusion_step_m, row_ends, detection);
+        if (!config.use_residual) continue;
+        const AverageResidual residual = average_residual(pixels, residuals.image());
+        detection.average_residual_m = residual.mean_m;
+        detection.residual_points = residual.count;
+    }
+    result.pixels.swap(completed);
 }
 
 void Detector::State::detect(Frame& frame) {
@@ -120,6 +147,7 @@ void Detector::process(Frame& frame) {
     if ((frame.odometry.flags & OdometryResult::kReinitialized) != 0) state.evidence.forget();
     if (state.config.use_free_space) state.test(frame);
     state.detect(frame);
+    state.complete(frame);
     if (state.config.use_free_space) state.evidence.remember(frame);
 }
 

@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "core/evidence/completion.hpp"
 #include "core/evidence/free_space.hpp"
 #include "core/evidence/moving_parts.hpp"
 #include "core/residuals/residual_image.hpp"
@@ -19,8 +20,10 @@ struct DetectionConfig {
     int samples = 150;
     int background_stride = 8;
     double mixed_share = 0.25;
+    double compact_m = 1.2;
     FreeSpaceConfig free_space;
     MovingPartsConfig parts;
+    CompletionConfig completion;
 
     template <class V>
     void visit(V& v) {
@@ -36,8 +39,10 @@ struct DetectionConfig {
             "of segments that are no objects every n-th pixel is tested; higher is faster, finds less at walls");
         v.parameter("mixed_share", mixed_share, Range{0.0, 1.0}, "1",
                     "a segment of which this share of the evidence says occupied, and the rest free, is divided");
+        v.parameter("compact_m", compact_m, Range{0.0, 10.0}, "m", "segments no wider than this are not divided");
         v.group("free_space", free_space, "comparison with earlier frames");
         v.group("parts", parts, "moving parts of segments");
+        v.group("completion", completion, "pixels at the edges and feet of objects");
     }
 };
 

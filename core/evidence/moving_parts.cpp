@@ -74,6 +74,9 @@ bool MovingParts::grow(const Frame& frame, const Segment& segment, const Evidenc
             away_m_.push_back(away);
         }
     }
+    const auto [low, high] = std::minmax_element(
+        part_.begin(), part_.end(), [&](PixelIndex a, PixelIndex b) { return odometry.z[a] < odometry.z[b]; });
+    if (static_cast<double>(odometry.z[*high] - odometry.z[*low]) < config_.min_height_m) return false;
     return part_.size() >= static_cast<std::size_t>(config_.min_points) &&
            static_cast<double>(free) >= config_.min_free_share * static_cast<double>(part_.size());
 }

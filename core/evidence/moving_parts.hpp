@@ -12,7 +12,8 @@ namespace dlod {
 
 struct MovingPartsConfig {
     double reach_m = 0.3;
-    int min_points = 8;
+    int min_points = 6;
+    double min_height_m = 0.15;
     double min_free_share = 0.4;
 
     template <class V>
@@ -20,6 +21,8 @@ struct MovingPartsConfig {
         v.parameter("reach_m", reach_m, Range{0.01, 2.0}, "m",
                     "pixels without evidence join a moving part within this distance");
         v.parameter("min_points", min_points, Range{1, 1000}, "pixels", "smaller parts are noise");
+        v.parameter("min_height_m", min_height_m, Range{0.0, 2.0}, "m",
+                    "flatter parts are noise: thin plates lie between the beams in some frames");
         v.parameter("min_free_share", min_free_share, Range{0.0, 1.0}, "1",
                     "share of a part's pixels that must lie where it was free");
     }
