@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <set>
 #include <sstream>
+#include <utility>
 
 namespace dlod::daemon {
 namespace {
@@ -81,6 +83,27 @@ void apply_map(const OptionList& options, const YAML::Node& map, const std::stri
     }
 }
 
+/// Four blanks for each group that the key is in.
+std::string indent_of(const std::string& key) {
+    return std::string(4 * static_cast<std::size_t>(std::count(key.begin(), key.end(), '.')), ' ');
+}
+
+/// Text as comment lines of at most 100 characters.
+std::string comment(const std::string& text, const std::string& indent) {
+    constexpr std::size_t kWidth = 100;
+    std::istringstream words(text);
+    std::string out;
+    std::string line = indent + "#";
+    for (std::string word; words >> word;) {
+        if (line.size() + 1 + word.size() > kWidth) {
+            out += line + '\n';
+            line = indent + "#";
+        }
+        line += ' ' + word;
+    }
+    return out + line + '\n';
+}
+
 }  // namespace
 
 void apply_yaml(Config& config, const std::string& yaml, const std::string& name) {
@@ -144,24 +167,25 @@ std::string to_yaml(const Config& config) {
     std::string out =
         "# Configuration of dlod: every key with its default. A file needs only the keys that differ.\n"
         "# Made by `dlod print-config`; `dlod check-config FILE` checks a file.\n";
-    // Indents by the depth of the group; keys of the top level come back to none.
-    const auto indent_of = [](const std::string& key) {
-        return std::string(4 * static_cast<std::size_t>(std::count(key.begin(), key.end(), '.')), ' ');
-    };
+    const auto leaf_of = [](const std::string& key) { return key.substr(key.rfind('.') + 1); };
+    bool after_nested_group = false;
     for (std::size_t i = 0; i < options.size(); ++i) {
         if (const auto* group = std::get_if<OptionGroup>(&options[i])) {
             const std::string indent = indent_of(group->prefix);
-            out += fmt::format("\n{0}# {1}\n{0}{2}:\n", indent, group->about,
-                               group->prefix.substr(group->prefix.rfind('.') + 1));
+            out += '\n' + comment(group->about, indent) + fmt::format("{}{}:\n", indent, leaf_of(group->prefix));
+            after_nested_group = true;
             continue;
         }
         const auto& option = std::get<Option>(options[i]);
         const std::string indent = indent_of(option.key);
+        if (indent.empty() && std::exchange(after_nested_group, false)) out += '\n';
         const std::string unit =
-            option.unit.empty() || option.unit == "1" ? "" : fmt::format(" Unit: {}.", option.unit);
-        out += fmt::format("{0}# {1}.\n{0}#{2} Default: {3}. Valid values: {4}.\n", indent, option.effect, unit,
-                           std::get<Option>(default_options[i]).to_yaml(), option.valid_values());
-        out += fmt::format("{}{}: {}\n", indent, option.key.substr(option.key.rfind('.') + 1), option.to_yaml());
+            option.unit.empty() || option.unit == "1" ? "" : fmt::format("Unit: {}. ", option.unit);
+        out += comment(option.effect + ".", indent);
+        out += comment(fmt::format("{}Default: {}. Valid values: {}.", unit,
+                                   std::get<Option>(default_options[i]).to_yaml(), option.valid_values()),
+                       indent);
+        out += fmt::format("{}{}: {}\n", indent, leaf_of(option.key), option.to_yaml());
     }
     return out;
 }

@@ -8,11 +8,12 @@
 namespace dlod::daemon {
 
 const std::vector<Preset>& presets() {
-    // The defaults are those of an OS0-128. With fewer rows every row counts for the registration.
+    // The defaults are those of 128 rows, of which 43 are candidates; with 32 rows as many candidates need more
+    // columns.
     static const std::vector<Preset> table = {
-        {"OS0", 64, {"subsampling.row_step=1"}}, {"OS0", 32, {"subsampling.row_step=1", "subsampling.column_step=3"}},
-        {"OS1", 64, {"subsampling.row_step=1"}}, {"OS1", 32, {"subsampling.row_step=1", "subsampling.column_step=3"}},
-        {"OS2", 64, {"subsampling.row_step=1"}}, {"OS2", 32, {"subsampling.row_step=1", "subsampling.column_step=3"}},
+        {"OS0", 32, {"subsampling.column_step=3"}},
+        {"OS1", 32, {"subsampling.column_step=3"}},
+        {"OS2", 32, {"subsampling.column_step=3"}},
     };
     return table;
 }
