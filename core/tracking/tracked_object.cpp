@@ -52,10 +52,8 @@ OrientedBox TrackedObject::visible_box(const Frame& frame, const DetectionShapes
 TrackedObject::TrackedObject(std::uint32_t id, const Frame& frame, const DetectionShapes& shapes,
                              const Sighting& sighting, const TrackingConfig& config)
     : id_(id),
-      filter_(first_measurement(shapes, sighting,
-                                visible_box(frame, shapes, sighting, largest_shape(shapes, sighting).axis.yaw_rad),
-                                config.filter),
-              config.filter),
+      visible_(visible_box(frame, shapes, sighting, largest_shape(shapes, sighting).axis.yaw_rad)),
+      filter_(first_measurement(shapes, sighting, visible_, config.filter), config.filter),
       origin_m_(filter_.box().center_m) {
     std::vector<OrientedBox> nothing_to_clear;
     see(frame, shapes, sighting, config, nothing_to_clear);
@@ -97,14 +95,13 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
     if (hits_ > 0) {
         const auto [yaw, yaw_sd] = measured_yaw(shape.axis);
         const OrientedBox remembered = filter_.box();
-        const OrientedBox visible = visible_box(frame, shapes, sighting, remembered.yaw_rad);
-        BoxMeasurement m = complete_extent(visible, remembered, sighting.visibility, config.filter);
+        visible_ = visible_box(frame, shapes, sighting, remembered.yaw_rad);
+        BoxMeasurement m = complete_extent(visible_, remembered, sighting.visibility, config.filter);
         m.age_s = shape.age_s;
         m.box.yaw_rad = yaw;
         m.yaw_sd_rad = yaw_sd;
         filter_.update(m, config.filter);
     }
-    visible_ = visible_box(frame, shapes, sighting, filter_.box().yaw_rad);
     // At the stamp, as the filter's centre.
     visible_.center_m += shape.age_s * filter_.velocity() - filter_.box().center_m;
 
@@ -125,7 +122,8 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
     cues.shift_m = (filter_.box().center_m - origin_m_).head<2>().norm();
     cues.dt_s = unseen_s_;
     cues.position_m = filter_.box().center_m.head<2>();
-    if (config.state.use_displacement) cues.displacement_log_odds = displacement_cue(frame, sighting);
+    if (config.state.use_displacement && !clear_without_displacement(cues))
+        cues.displacement_log_odds = displacement_cue(frame, sighting);
 
     ++hits_;
     misses_ = 0;
@@ -152,6 +150,14 @@ bool TrackedObject::dead(const TrackingConfig& config) const {
     if (unseen_frames_ > config.max_misses_occluded) return true;
     const bool established = belief_.state() == DynamicState::kDynamic || hits_ > config.max_misses;
     return misses_ > (established ? config.max_misses : config.max_misses_undecided);
+}
+
+// Registration costs more than the other cues together: where free space leaves no doubt it is not asked.
+bool TrackedObject::clear_without_displacement(const MotionCues& cues) const {
+    const double share = free_share(cues);
+    if (share < 0.0 || hits_ == 0) return false;
+    if (belief_.state() == DynamicState::kDynamic) return share > 0.3;
+    return belief_.state() == DynamicState::kStatic && share < 0.05;
 }
 
 double TrackedObject::displacement_cue(const Frame& frame, const Sighting& sighting) {

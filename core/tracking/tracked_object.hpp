@@ -50,6 +50,7 @@ class TrackedObject {
   private:
     /// Which way the object points, from its motion or its shape; aligns the filter's axes and returns the noise.
     std::pair<double, double> measured_yaw(const PrincipalAxis& axis);
+    bool clear_without_displacement(const MotionCues& cues) const;
     /// Registers this frame's points to earlier ones, and renews those.
     double displacement_cue(const Frame& frame, const Sighting& sighting);
     /// Visible box of all parts at one yaw.
@@ -57,10 +58,10 @@ class TrackedObject {
                                    double yaw_rad);
 
     std::uint32_t id_;
+    OrientedBox visible_;  ///< of the last sighting; its centre is an offset from the filter's
     KalmanFilter filter_;
     MotionBelief belief_;
     BoxHistory history_;
-    OrientedBox visible_;  ///< of the last sighting; its centre is an offset from the filter's
     Eigen::Vector3d origin_m_;
     PointSample before_;  ///< points of half a second to a second ago, or of the first sighting
     PointSample since_;   ///< those that follow them
