@@ -13,6 +13,7 @@ namespace {
 constexpr int kYoungHits = 3;              // detections before a velocity means something
 constexpr double kHeadingSpeed_mps = 0.7;  // slower objects may move sideways
 constexpr double kElongated = 1.6;         // a principal axis says where an object points
+constexpr double kStale_s = 2.0;           // older ones show another side
 constexpr double kReference_s = 0.45;      // points to register to are renewed that often
 
 const DetectionShape& largest_shape(const DetectionShapes& shapes, const Sighting& sighting) {
@@ -141,9 +142,15 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
     }
 }
 
-void TrackedObject::miss(bool occluded) {
-    if (!occluded) ++misses_;
+void TrackedObject::miss(Sight sight) {
+    sight_ = sight;
+    misses_ += sight == Sight::kNearer ? 0 : sight == Sight::kFarther ? 2 : 1;
     ++unseen_frames_;
+}
+
+bool TrackedObject::visible_to_others() const {
+    return seen_now_ ||
+           (belief_.state() == DynamicState::kDynamic && !(sight_ == Sight::kFarther && unseen_frames_ > 1));
 }
 
 bool TrackedObject::dead(const TrackingConfig& config) const {
@@ -167,6 +174,10 @@ double TrackedObject::displacement_cue(const Frame& frame, const Sighting& sight
     const Eigen::Vector2d center = filter_.box().center_m.head<2>();
     double log_odds = 0.0;
     if (hits_ == 0) {
+        before_ = since_ = now;
+        before_center_m_ = since_center_m_ = center;
+    } else if (before_.age_s > kStale_s) {
+        // It was not asked for a while: begin anew.
         before_ = since_ = now;
         before_center_m_ = since_center_m_ = center;
     } else {

@@ -7,6 +7,7 @@
 #include "core/tracking/association.hpp"
 #include "core/tracking/detection_shapes.hpp"
 #include "core/tracking/dynamic_state.hpp"
+#include "core/tracking/expected_sight.hpp"
 #include "core/tracking/object_extent.hpp"
 #include "core/tracking/registered_displacement.hpp"
 
@@ -31,10 +32,13 @@ class TrackedObject {
     void see(const Frame& frame, const DetectionShapes& shapes, const Sighting& sighting, const TrackingConfig& config,
              std::vector<OrientedBox>& cleared);
 
-    /// No detection in this frame. @param occluded something nearer hides it: it does not age
-    void miss(bool occluded);
+    /// No detection in this frame. @param sight at its predicted box: what something nearer hides does not age, what is
+    /// gone ages twice
+    void miss(Sight sight);
 
     bool dead(const TrackingConfig& config) const;
+    /// Worth telling others of: seen, or dynamic and not known to be gone.
+    bool visible_to_others() const;
     /// Seen often enough to believe in it as an object of its own.
     bool steady() const { return hits_ >= 3; }
 
@@ -70,6 +74,7 @@ class TrackedObject {
     double residual_m_ = 0.0;
     int points_ = 0;  ///< of the last sighting
     bool seen_now_ = true;
+    Sight sight_ = Sight::kThere;  ///< at the last miss
     int hits_ = 0;
     int misses_ = 0;
     int unseen_frames_ = 0;

@@ -43,7 +43,8 @@ CandidateDetection candidate(const Detection& detection, const DetectionShape& s
 }  // namespace
 
 struct Tracker::State {
-    State(const SensorModel& sensor, const TrackingConfig& tracking) : config(tracking), shapes(sensor) {
+    State(const SensorModel& sensor, const TrackingConfig& tracking)
+        : config(tracking), shapes(sensor), projection(sensor) {
         objects.reserve(static_cast<std::size_t>(tracking.max_tracks));
     }
 
@@ -62,6 +63,7 @@ struct Tracker::State {
     bool started = false;
 
     DetectionShapes shapes;
+    SweepProjection projection;
     MergedDetections merged;
     Association association;
     std::vector<ExpectedTrack> expected;
@@ -155,9 +157,9 @@ void Tracker::State::see_and_miss(Frame& frame) {
         const Sighting sighting = sighting_of(frame, t);
         if (!sighting.detections.empty()) objects[t].see(frame, shapes, sighting, config, frame.detection.cleared);
     }
-    for (std::size_t t = 0; t < objects.size(); ++t) {
-        if (objects[t].seen()) continue;
-        objects[t].miss(false);
+    projection.set(frame.odometry);
+    for (TrackedObject& object : objects) {
+        if (!object.seen()) object.miss(look_at(object.box(), frame, projection));
     }
     // Two tracks on one object: the one that was not seen goes.
     const auto duplicate = [&](const TrackedObject& object) {
@@ -209,7 +211,7 @@ void Tracker::State::give_birth(Frame& frame) {
 void Tracker::State::publish(Frame& frame) {
     std::vector<int> row(objects.size(), -1);
     for (std::size_t t = 0; t < objects.size(); ++t) {
-        if (!objects[t].seen() && objects[t].state() != DynamicState::kDynamic) continue;
+        if (!objects[t].visible_to_others()) continue;
         row[t] = static_cast<int>(frame.detection.tracks.size());
         frame.detection.tracks.push_back(objects[t].published());
     }
