@@ -8,9 +8,12 @@ namespace {
 
 constexpr int kMinTested = 5;         // points: fewer say nothing about free space
 constexpr double kPatience = 10.0;    // tested points that count for half of full trust
+constexpr double kTall_m = 0.4;       // detections of that height count in full
 constexpr double kUnconfirmed = 0.3;  // trust in a displacement where no free space was tested
 constexpr double kMaxLogOdds = 8.0;   // bounds keep a belief reversible
 constexpr double kMaxStep = 3.0;      // one frame alone never decides
+constexpr double kAway_m = 0.15;      // from the mean place of rest
+constexpr double kRestMean = 0.1;     // weight of a new position in that mean
 constexpr int kAwayDetections = 2;    // in a row off the place of rest: it has set off
 
 }  // namespace
@@ -29,7 +32,9 @@ double motion_log_odds(const MotionCues& cues, const DynamicStateConfig& config)
         if (share >= 0.0) {
             const double tested = cues.free_points + cues.occupied_points;
             const double known = tested / (tested + cues.unknown_points);
-            sum += config.free_weight * (share - config.free_fraction) * known * tested / (tested + kPatience);
+            // A single row is as often an edge seen at a grazing angle as a thing of its own.
+            const double tall = std::min(1.0, cues.height_m / kTall_m);
+            sum += config.free_weight * (share - config.free_fraction) * known * tall * tested / (tested + kPatience);
             // What has moved stands, at least with its front, where free space was.
             trust_in_displacement = std::min(1.0, share / config.free_fraction);
         }
@@ -64,10 +69,14 @@ DynamicState MotionBelief::by_paper(const MotionCues& cues, const DynamicStateCo
 
 // At rest is what has stayed within a small circle: a slow walk leaves it, noise does not.
 void MotionBelief::rest(const MotionCues& cues, const DynamicStateConfig& config) {
-    const bool away = (cues.position_m - anchor_m_).norm() > config.rest_radius_m;
-    off_anchor_ = away ? off_anchor_ + 1 : 0;
+    const double distance = (cues.position_m - anchor_m_).norm();
+    if (rested_) {
+        off_anchor_ = distance > kAway_m ? off_anchor_ + 1 : 0;
+        if (off_anchor_ == 0) anchor_m_ += kRestMean * (cues.position_m - anchor_m_);
+        return;
+    }
     rest_s_ += cues.dt_s;
-    if (away && !rested_) {
+    if (distance > config.rest_radius_m) {
         anchor_m_ = cues.position_m;
         rest_s_ = 0.0;
     }
@@ -78,6 +87,7 @@ DynamicState MotionBelief::fused(const MotionCues& cues, const DynamicStateConfi
     rest(cues, config);
     if (state_ == DynamicState::kDynamic) {
         rested_ = rest_s_ >= config.rest_time_s;
+        off_anchor_ = 0;
         const bool mistaken = log_odds_ <= config.static_log_odds;
         if (!rested_ && !mistaken) return state_;
         log_odds_ = std::min(log_odds_, 0.0);

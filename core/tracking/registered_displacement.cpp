@@ -11,6 +11,8 @@ namespace {
 
 constexpr float kOutlier_m = 0.15F;      // plane distances are bounded here
 constexpr float kMaxNeighbour_m = 1.5F;  // planes end somewhere; as far as that a wall may have come into view
+constexpr float kInPlace_m = 0.06F;      // so near the old surface a point has not moved
+constexpr double kMostInPlace = 0.4;     // of an object's points, while it moves
 constexpr int kIterations = 4;
 constexpr double kNoise_m = 0.04;     // of a plane distance: pose, range noise, curvature
 constexpr double kIndependent = 6.0;  // so many independent points are believed in, however many there are
@@ -85,6 +87,7 @@ struct Fit {
     Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
     Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
     int inliers = 0;
+    int in_place = 0;
 };
 
 Fit fit(const PointSample& before, const PointSample& now, const Eigen::Vector2d& d) {
@@ -94,6 +97,7 @@ Fit fit(const PointSample& before, const PointSample& now, const Eigen::Vector2d
         const Match m = match(before, now, i, between, d.cast<float>());
         const float bounded = m.found ? std::min(std::abs(m.distance_m), kOutlier_m) : kOutlier_m;
         f.cost_m2 += bounded * bounded;
+        if (bounded < kInPlace_m) ++f.in_place;
         if (!m.found || std::abs(m.distance_m) > 2.0F * kOutlier_m) continue;
         const Eigen::Vector2d n(m.normal_x, m.normal_y);
         f.information += n * n.transpose();
@@ -138,6 +142,7 @@ RegisteredDisplacement register_displacement(const PointSample& before, const Po
     if (before.size < kMinPoints || now.size < kMinPoints) return best;
     const Fit stayed = fit(before, now, Eigen::Vector2d::Zero());
     best.stayed_m2 = best.moved_m2 = stayed.cost_m2;
+    best.in_place = static_cast<double>(stayed.in_place) / static_cast<double>(now.size);
     if (stayed.inliers > 0) {
         const Eigen::Matrix2d mean = stayed.information / stayed.inliers;
         const double half_trace = 0.5 * mean.trace();
@@ -166,7 +171,7 @@ double displacement_log_odds(const RegisteredDisplacement& r, double elapsed_s) 
     if (r.stayed_m2 <= 0.0) return 0.0;
     const double noise = kNoise_m * kNoise_m;
     const double gain = 0.5 * kIndependent * (r.stayed_m2 - r.moved_m2) / std::max(noise, r.moved_m2);
-    const bool fits = r.moved_m2 < kMaxFit_m * kMaxFit_m;
+    const bool fits = r.moved_m2 < kMaxFit_m * kMaxFit_m && r.in_place < kMostInPlace;
     if (gain > kPrior) return fits ? std::min(gain - kPrior, kMaxLogOdds) : 0.0;
     const bool would_show = kSlow_mps * elapsed_s > 2.0 * kNoise_m && r.observable > kMinObservable;
     return would_show && r.stayed_m2 < 2.0 * noise ? kAgainst : 0.0;

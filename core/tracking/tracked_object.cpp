@@ -11,6 +11,8 @@ namespace dlod {
 namespace {
 
 constexpr int kYoungHits = 3;              // detections before a velocity means something
+constexpr int kEstablishedHits = 5;        // detections before its prediction is worth something
+constexpr int kBlindFrames = 2;            // a prediction is published where nothing is seen
 constexpr double kHeadingSpeed_mps = 0.7;  // slower objects may move sideways
 constexpr double kElongated = 1.6;         // a principal axis says where an object points
 constexpr double kStale_s = 2.0;           // older ones show another side
@@ -149,17 +151,19 @@ void TrackedObject::miss(Sight sight) {
 }
 
 bool TrackedObject::visible_to_others() const {
-    return seen_now_ ||
-           (belief_.state() == DynamicState::kDynamic && !(sight_ == Sight::kFarther && unseen_frames_ > 1));
+    if (seen_now_) return true;
+    if (belief_.state() != DynamicState::kDynamic || hits_ < kEstablishedHits) return false;
+    return sight_ == Sight::kNearer || sight_ == Sight::kThere ||
+           (sight_ == Sight::kUnknown && unseen_frames_ <= kBlindFrames);
 }
 
 bool TrackedObject::dead(const TrackingConfig& config) const {
-    if (unseen_frames_ > config.max_misses_occluded) return true;
-    const bool established = belief_.state() == DynamicState::kDynamic || hits_ > config.max_misses;
+    const bool established =
+        hits_ >= kEstablishedHits && (belief_.state() == DynamicState::kDynamic || hits_ > config.max_misses);
+    if (unseen_frames_ > (established ? config.max_misses_occluded : config.max_misses)) return true;
     return misses_ > (established ? config.max_misses : config.max_misses_undecided);
 }
 
-// Registration costs more than the other cues together: where free space leaves no doubt it is not asked.
 bool TrackedObject::clear_without_displacement(const MotionCues& cues) const {
     const double share = free_share(cues);
     if (share < 0.0 || hits_ == 0) return false;

@@ -14,6 +14,9 @@ namespace dlod {
 namespace {
 
 constexpr double kPartMargin_m = 0.15;  // a part's middle lies at most this far outside of the whole object's box
+constexpr double kLimbMargin_m = 0.4;   // and that of a small piece beside a moving object
+constexpr unsigned kLimb = 3;           // small: a third of the object's pixels
+constexpr int kYoungHits = 10;
 constexpr double kSameFootprint = 0.4;  // parts above one another share that much of the smaller footprint
 constexpr double kMaxGap_m = 0.5;       // and are at most that far apart in height
 constexpr double kDuplicate = 0.6;      // an unseen track that shares that much with a seen one is the same object
@@ -112,20 +115,28 @@ void Tracker::State::associate(Frame& frame) {
     }
 }
 
-// What is left and lies inside of the box of an object that was found is a part of it, split off by an occluder.
+// What is left and lies inside of the box of an object that was found is a part of it, split off by an occluder; small
+// pieces beside a moving one are its limbs. A young track on such a piece gives it up.
 void Tracker::State::attach_parts(Frame& frame) {
     const auto& detections = frame.detection.detections;
     const std::vector<int> matched = owner;
     for (std::size_t d = 0; d < detections.size(); ++d) {
-        if (matched[d] >= 0) continue;
-        double best = kPartMargin_m;
+        const int own = matched[d];
+        if (own >= 0 && objects[static_cast<std::size_t>(own)].hits() >= kYoungHits) continue;
+        double best = 1.0;
         for (std::size_t other = 0; other < detections.size(); ++other) {
-            if (matched[other] < 0) continue;
+            if (matched[other] < 0 || matched[other] == own) continue;
             const auto t = static_cast<std::size_t>(matched[other]);
-            if (!objects[t].steady() || candidates[d].motion * expected[t].motion < -0.2) continue;
-            const OrientedBox box = objects[t].box();
+            const TrackedObject& host = objects[t];
+            if (!host.steady() || (own >= 0 && host.hits() < 2 * objects[static_cast<std::size_t>(own)].hits()))
+                continue;
+            if (candidates[d].motion * expected[t].motion < -0.2) continue;
+            const OrientedBox box = host.box();
             if (height_gap_m(box, detections[d].box) > kMaxGap_m) continue;
-            const double distance = footprint_distance_m(box, detections[d].centroid_m);
+            const bool limb = host.state() == DynamicState::kDynamic && own < 0 &&
+                              kLimb * detections[d].count < detections[other].count;
+            const double reach = limb ? kLimbMargin_m : kPartMargin_m;
+            const double distance = footprint_distance_m(box, detections[d].centroid_m) / reach;
             if (distance < best) {
                 best = distance;
                 owner[d] = matched[other];

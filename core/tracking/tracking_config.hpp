@@ -41,7 +41,7 @@ struct KalmanConfig {
 struct AssociationConfig {
     double alpha = 0.8;
     double beta = 0.1;
-    double evidence_weight = 0.3;
+    double evidence_weight = 0.6;
     double max_speed_mps = 25.0;
     double gate_sigma = 3.5;
     double unmatched_cost = 0.88;
