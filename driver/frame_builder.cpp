@@ -183,9 +183,13 @@ void FrameBuilder::count_straggler(const LidarPacket& packet, std::int32_t dista
 
 void FrameBuilder::suspect(const LidarPacket& packet) {
     const std::int32_t distance = info_.format->frame_distance(suspect_.header.frame_id, packet.header.frame_id);
-    const bool other_packet = distance != 0 || packet.first_measurement != suspect_.first_measurement;
-    if (suspect_present_ && suspect_.header.init_id == packet.header.init_id && std::abs(distance) <= 1 &&
-        other_packet) {
+    const bool same_sensor = suspect_present_ && suspect_.header.init_id == packet.header.init_id;
+    if (same_sensor && distance == 0 && packet.first_measurement == suspect_.first_measurement) {
+        // Once more the same confirms nothing.
+        ++counters_.duplicate_packets;
+        return;
+    }
+    if (same_sensor && std::abs(distance) <= 1) {
         suspect_present_ = false;
         start_at(distance >= 0 ? suspect_.header.frame_id : packet.header.frame_id, packet.header.init_id);
         read_columns(suspect_);

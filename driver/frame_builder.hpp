@@ -47,6 +47,8 @@ class FrameBuilder {
     static constexpr int kPacketsToClose = 4;
 
     FrameBuilder(const SensorInfo& info, const FrameBuilderConfig& config, Acquire acquire, Emit emit);
+    FrameBuilder(const FrameBuilder&) = delete;
+    FrameBuilder& operator=(const FrameBuilder&) = delete;
 
     /// Handles one datagram, lidar or IMU or anything else; the frame that it completes is emitted before this returns.
     void push(const Packet& packet);
