@@ -4,10 +4,10 @@
 # usage: tools/bench.sh PCAP [--kernels] [REPLAY_ARGUMENT...]
 #   --kernels   also the kernels one by one (Google Benchmark; needs a build with -DDLOD_BUILD_BENCHMARKS=ON, which
 #               tools/test.sh makes)
-# Needs a build in build/, or in the folder that DLOD_BUILD names. Run it on an idle machine.
+# Needs a build in build/, or in the folder that BUILD_DIR names. Run it on an idle machine.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
-build=${DLOD_BUILD:-$here/../build}
+build=${BUILD_DIR:-$here/../build}
 [[ $# -ge 1 && $1 != -* ]] || { sed -n '2,7s/^# \{0,1\}//p' "$0"; exit 2; }
 pcap=$1
 shift

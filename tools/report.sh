@@ -6,10 +6,10 @@
 #               times are CPU times
 #   --pcap      the capture; needed for the comparison on and off and for the pictures of a frame
 #   --out       where report.md, plots and pictures go; default: RUN/../report
-# Needs a build (tools/test.sh or tools/demo.sh make it) in build/, or in the folder that DLOD_BUILD names.
+# Needs a build (tools/test.sh or tools/demo.sh make it) in build/, or in the folder that BUILD_DIR names.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
-build=${DLOD_BUILD:-$here/../build}
+build=${BUILD_DIR:-$here/../build}
 
 run= pcap= truth= out=
 metadata=() config=()
