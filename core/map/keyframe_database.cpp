@@ -7,6 +7,11 @@
 namespace dlod {
 namespace {
 
+constexpr std::size_t kAnchors = 5;
+// The first scans all become keyframes, so that the map does not rest on the noise of a single one.
+constexpr std::size_t kFirstKeyframes = 5;
+constexpr std::size_t kMaxAnnounced = 16;
+
 double angle_between(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
     return 2.0 * std::acos(std::min(1.0, std::abs(a.dot(b))));
 }
@@ -21,12 +26,13 @@ KeyframeDatabase::KeyframeDatabase(const KeyframeConfig& config, const VoxelMapC
     : config_(config), submap_(voxels) {
     const auto most = static_cast<std::size_t>(config.max_keyframes) + 1;
     keyframes_.reserve(most);
-    announced_.reserve(16);
+    announced_.reserve(kMaxAnnounced);
     chosen_.reserve(most);
     order_.reserve(most);
 }
 
 bool KeyframeDatabase::is_due(const Eigen::Isometry3d& T, double spaciousness_m) const {
+    if (keyframes_.size() + announced_.size() < kFirstKeyframes) return true;
     const double distance =
         std::clamp(config_.distance_share * spaciousness_m, config_.min_distance_m, config_.max_distance_m);
     const double angle = config_.angle_deg * std::numbers::pi / 180.0;
@@ -37,14 +43,28 @@ bool KeyframeDatabase::is_due(const Eigen::Isometry3d& T, double spaciousness_m)
     for (const Keyframe& k : keyframes_) {
         if (covers(k.position_m, k.rotation)) return false;
     }
-    for (const Eigen::Isometry3d& pose : announced_) {
-        if (covers(pose.translation(), Eigen::Quaterniond(pose.rotation()))) return false;
+    for (const Announced& a : announced_) {
+        if (covers(a.T_world_sensor.translation(), Eigen::Quaterniond(a.T_world_sensor.rotation()))) return false;
     }
     return true;
 }
 
-void KeyframeDatabase::announce(const Eigen::Isometry3d& T_world_sensor) {
-    announced_.push_back(T_world_sensor);
+void KeyframeDatabase::announce(const Eigen::Isometry3d& T_world_sensor, const Matrix6d& covariance) {
+    // One that never came (its frame was dropped) makes room.
+    if (announced_.size() == announced_.capacity()) announced_.erase(announced_.begin());
+    announced_.push_back({T_world_sensor, covariance});
+}
+
+Matrix6d KeyframeDatabase::anchor_covariance(const Eigen::Vector3d& position_m) const {
+    Matrix6d sum = Matrix6d::Zero();
+    const std::size_t count = std::min(order_.size(), kAnchors);
+    for (std::size_t i = 0; i < count; ++i) {
+        const Keyframe& keyframe = keyframes_[order_[i].second];
+        Matrix6d J = Matrix6d::Identity();
+        J.block<3, 3>(0, 3) = -skew(position_m - keyframe.position_m);
+        sum += J * keyframe.covariance * J.transpose();
+    }
+    return count > 0 ? Matrix6d(sum / static_cast<double>(count)) : sum;
 }
 
 void KeyframeDatabase::convert(const KeyframeCloud& cloud, std::vector<FixedPoint>& points) {
@@ -65,13 +85,19 @@ void KeyframeDatabase::convert(const KeyframeCloud& cloud, std::vector<FixedPoin
 void KeyframeDatabase::add(const KeyframeCloud& cloud) {
     submap_.remove(provisional_);
     provisional_.clear();
-    std::erase_if(announced_, [&](const Eigen::Isometry3d& pose) { return pose.isApprox(cloud.T_world_sensor); });
+    Matrix6d covariance = Matrix6d::Zero();
+    std::erase_if(announced_, [&](const Announced& a) {
+        if (a.T_world_sensor.matrix() != cloud.T_world_sensor.matrix()) return false;
+        covariance = a.covariance;
+        return true;
+    });
     if (keyframes_.size() >= static_cast<std::size_t>(config_.max_keyframes)) {
         forget_farthest(cloud.T_world_sensor.translation());
     }
     Keyframe& keyframe = keyframes_.emplace_back();
     keyframe.position_m = cloud.T_world_sensor.translation();
     keyframe.rotation = Eigen::Quaterniond(cloud.T_world_sensor.rotation());
+    keyframe.covariance = covariance;
     convert(cloud, keyframe.points);
     keyframe.low_m.setConstant(1e12);
     keyframe.high_m.setConstant(-1e12);
@@ -91,6 +117,7 @@ void KeyframeDatabase::set_provisional(const KeyframeCloud& cloud) {
 void KeyframeDatabase::clear() {
     keyframes_.clear();
     announced_.clear();
+    order_.clear();
     provisional_.clear();
     submap_.clear();
 }

@@ -8,6 +8,7 @@
 
 #include "core/map/voxel_map.hpp"
 #include "core/odometry/feedback.hpp"
+#include "core/types/lie.hpp"
 #include "core/types/oriented_box.hpp"
 #include "core/types/parameter.hpp"
 
@@ -51,7 +52,10 @@ class KeyframeDatabase {
     /// @param spaciousness_m median range of the scan
     bool is_due(const Eigen::Isometry3d& T_world_sensor, double spaciousness_m) const;
     /// Remembers that a keyframe is on its way, so that its neighbours do not become one too.
-    void announce(const Eigen::Isometry3d& T_world_sensor);
+    /// @param covariance of its pose in the world
+    void announce(const Eigen::Isometry3d& T_world_sensor, const Matrix6d& covariance);
+    /// How uncertain the submap itself is, as a pose at this position: mean of the nearest keyframes.
+    Matrix6d anchor_covariance(const Eigen::Vector3d& position_m) const;
     void add(const KeyframeCloud& cloud);
     /// A stand-in for the submap while there is no keyframe yet.
     void set_provisional(const KeyframeCloud& cloud);
@@ -72,6 +76,7 @@ class KeyframeDatabase {
         Eigen::Quaterniond rotation;
         std::vector<FixedPoint> points;
         Eigen::Vector3d low_m, high_m;  ///< bounds of the points, world
+        Matrix6d covariance;            ///< of the pose, translation and rotation, world
         bool in_submap = false;
     };
 
@@ -81,7 +86,11 @@ class KeyframeDatabase {
     KeyframeConfig config_;
     VoxelMap submap_;
     std::vector<Keyframe> keyframes_;
-    std::vector<Eigen::Isometry3d> announced_;
+    struct Announced {
+        Eigen::Isometry3d T_world_sensor;
+        Matrix6d covariance;
+    };
+    std::vector<Announced> announced_;
     std::vector<FixedPoint> provisional_;
     std::vector<std::uint8_t> chosen_;                   ///< scratch of update_submap
     std::vector<std::pair<double, std::size_t>> order_;  ///< scratch of update_submap

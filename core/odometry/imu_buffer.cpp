@@ -7,6 +7,8 @@ namespace {
 
 constexpr float kMaxAngularVelocity_radps = 50.0F;
 constexpr float kMaxAcceleration_mps2 = 200.0F;
+constexpr double kSpike_radps = 3.0;
+constexpr double kSpike_mps2 = 60.0;
 
 bool plausible(const ImuSample& s) {
     return s.angular_velocity_radps.allFinite() && s.acceleration_mps2.allFinite() &&
@@ -31,12 +33,39 @@ int ImuBuffer::add(std::span<const ImuSample> samples) {
             first_ = (first_ + 1) % kCapacity;
             --count_;
         }
-        samples_[(first_ + count_) % kCapacity] = {
-            s.stamp_ns, {s.angular_velocity_radps.cast<double>(), s.acceleration_mps2.cast<double>()}};
+        const Reading reading{s.angular_velocity_radps.cast<double>(), s.acceleration_mps2.cast<double>()};
+        if (last_is_spike(reading)) {
+            --count_;
+            --taken;
+        }
+        samples_[(first_ + count_) % kCapacity] = {s.stamp_ns, reading};
         ++count_;
         ++taken;
     }
     return taken;
+}
+
+/// The newest sample stands out from the one before it and from the next one, which agree.
+bool ImuBuffer::last_is_spike(const Reading& next) const {
+    if (count_ < 2) return false;
+    const Reading& last = stored(count_ - 1).reading;
+    const Reading& before = stored(count_ - 2).reading;
+    const auto stands_out = [](const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+                               double bound) {
+        const double jump = std::min((b - a).norm(), (b - c).norm());
+        return jump > bound && (c - a).norm() < 0.5 * jump;
+    };
+    return stands_out(before.angular_velocity_radps, last.angular_velocity_radps, next.angular_velocity_radps,
+                      kSpike_radps) ||
+           stands_out(before.acceleration_mps2, last.acceleration_mps2, next.acceleration_mps2, kSpike_mps2);
+}
+
+Eigen::Vector3d ImuBuffer::turn(std::int64_t from_ns, std::int64_t to_ns) const {
+    constexpr int kSteps = 40;
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (int i = 0; i < kSteps; ++i)
+        sum += at(from_ns + (to_ns - from_ns) * (2 * i + 1) / (2 * kSteps)).angular_velocity_radps;
+    return sum / kSteps * (static_cast<double>(to_ns - from_ns) * 1e-9);
 }
 
 ImuBuffer::Reading ImuBuffer::at(std::int64_t time_ns) const {

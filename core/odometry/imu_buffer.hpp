@@ -10,7 +10,8 @@
 
 namespace dlod {
 
-/// Keeps the newest samples in time order. What is no number, out of order or beyond any sensor's range is left out.
+/// Keeps the newest samples in time order. What is no number, out of order or beyond any sensor's range is left out,
+/// and so is a single sample that stands out from both its neighbours as no body can move.
 class ImuBuffer {
   public:
     struct Reading {
@@ -21,6 +22,8 @@ class ImuBuffer {
     /// @return number of samples that were taken over
     int add(std::span<const ImuSample> samples);
     void clear() { count_ = 0; }
+    /// Mean angular velocity times time from one moment to another, rad.
+    Eigen::Vector3d turn(std::int64_t from_ns, std::int64_t to_ns) const;
     bool empty() const { return count_ == 0; }
     std::int64_t newest_ns() const;
     std::int64_t oldest_ns() const;
@@ -35,6 +38,7 @@ class ImuBuffer {
         Reading reading;
     };
     const Stored& stored(std::size_t i) const { return samples_[(first_ + i) % kCapacity]; }
+    bool last_is_spike(const Reading& next) const;
 
     std::array<Stored, kCapacity> samples_;
     std::size_t first_ = 0;

@@ -170,6 +170,7 @@ void MotionFilter::sweep(double duration_s, const Eigen::Vector3d& origin_m, Swe
 
 void MotionFilter::begin_update() {
     prior_ = state_;
+    prior_deviation_ = covariance_.diagonal().cwiseSqrt();
     prior_information_ = covariance_.ldlt().solve(Matrix::Identity());
     information_ = prior_information_;
 }

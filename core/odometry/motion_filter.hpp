@@ -87,12 +87,14 @@ class MotionFilter {
     void finish_update();
     /// Back to the prediction.
     void discard_update() { state_ = prior_; }
-    /// What the update has changed against the prediction, in standard deviations of the prediction, per block.
+    /// What the update has changed against the prediction, and the prediction's standard deviations.
     Vector correction() const;
+    const Vector& prior_deviation() const { return prior_deviation_; }
 
     const MotionState& state() const { return state_; }
     /// Replaces velocity and rate, with their uncertainty as it is.
     void set_motion(const Eigen::Vector3d& velocity_mps, const Eigen::Vector3d& rate_radps);
+    void set_gravity(const Eigen::Vector3d& gravity_mps2) { state_.gravity_mps2 = gravity_mps2; }
     Eigen::Isometry3d T_world_sensor() const;
     Eigen::Vector3d sensor_linear_velocity() const;   ///< sensor frame
     Eigen::Vector3d sensor_angular_velocity() const;  ///< sensor frame
@@ -113,6 +115,7 @@ class MotionFilter {
     const ImuBuffer* imu_ = nullptr;
     MotionState state_;
     MotionState prior_;
+    Vector prior_deviation_ = Vector::Zero();
     Matrix covariance_ = Matrix::Identity();
     Matrix prior_information_ = Matrix::Identity();
     Matrix information_ = Matrix::Identity();

@@ -1,5 +1,7 @@
 #include "core/registration/normal_equations.hpp"
 
+#include <cmath>
+
 #include "core/types/multiversion.hpp"
 
 namespace dlod {
@@ -57,6 +59,7 @@ void PlaneMatches::reserve(std::size_t n) {
     residual.resize(length);
     weight.resize(length);
     time_s.resize(length);
+    lever_m.resize(length);
 }
 
 void PlaneMatches::push(const float n[3], const float l[3], float distance, float inverse_variance, float time) {
@@ -69,6 +72,7 @@ void PlaneMatches::push(const float n[3], const float l[3], float distance, floa
     residual[count] = distance;
     weight[count] = inverse_variance;
     time_s[count] = time;
+    lever_m[count] = std::sqrt(l[0] * l[0] + l[1] * l[1] + l[2] * l[2]);
     ++count;
 }
 

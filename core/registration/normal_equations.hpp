@@ -16,6 +16,7 @@ struct PlaneMatches {
     static constexpr std::size_t kLanes = 8;
     std::array<AlignedVector<float>, 6> h;
     AlignedVector<float> residual, weight, time_s;
+    AlignedVector<float> lever_m;  ///< |q - s|
     std::size_t count = 0;
 
     /// Makes room for n matches.

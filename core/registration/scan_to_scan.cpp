@@ -41,7 +41,7 @@ void ScanToScan::set_target(const PointSelection& points, std::span<const std::u
                             const SweepMotion& motion, const Eigen::Isometry3f& T_sensor_local) {
     for (Surfel& surfel : grid_) surfel.set = false;
     for (std::size_t i = 0; i < points.size(); ++i) {
-        if (points.planarity[i] <= 0.0F || excluded[i]) continue;
+        if (points.planarity[i] <= 0.0F || (!excluded.empty() && excluded[i])) continue;
         float T[12];
         motion.at(points.time_s[i], T);
         const PlacedPoint local = place(T, points.x[i], points.y[i], points.z[i]);

@@ -36,6 +36,7 @@ class ScanToScan {
     explicit ScanToScan(const ScanToScanConfig& config);
 
     /// Keeps the flat points of a registered scan as the next one's target.
+    /// @param excluded by point, 1: left out; empty: none
     /// @param motion T_local_sensor of that scan
     /// @param T_sensor_local inverse of its last knot, the pose at its stamp
     void set_target(const PointSelection& points, std::span<const std::uint8_t> excluded, const SweepMotion& motion,
