@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 #include <string>
 
+#include "tools/draw/box_edges.hpp"
 #include "tools/draw/colors.hpp"
 
 namespace dlod::tools {
@@ -37,27 +38,27 @@ void caption(cv::Mat& picture, const std::string& text) {
     cv::putText(picture, text, {8, picture.rows - 8}, cv::FONT_HERSHEY_SIMPLEX, 0.6, kWhite, 1, cv::LINE_AA);
 }
 
-void draw_box(cv::Mat& picture, const Track& track, const ImageProjection& projection, const cv::Size2d& pixel) {
-    const auto at = [&](const cv::Point2d& p) {
-        return cv::Point(cvRound((p.x + 0.5) * pixel.width), cvRound((p.y + 0.5) * pixel.height));
-    };
+void draw_box(cv::Mat& picture, const Track& track, const SensorModel& sensor, const Frame& frame,
+              const cv::Size2d& pixel) {
     const cv::Scalar& color = color_of(track.state);
-    for (const auto& edge : projection.edges_of(track.box, track.velocity_mps)) {
-        for (std::size_t i = 1; i < edge.size(); ++i) {
-            const cv::Point a = at(edge[i - 1]);
-            const cv::Point b = at(edge[i]);
-            if (std::abs(a.x - b.x) < picture.cols / 2)
-                cv::line(picture, a, b, color, 1, cv::LINE_AA);  // not across the seam
+    cv::Point highest(0, picture.rows);
+    for (const auto& edge : box_edges(track, sensor, frame)) {
+        cv::Point before;
+        for (std::size_t i = 0; i < edge.size(); ++i) {
+            const cv::Point at(cvRound((edge[i].x + 0.5) * pixel.width), cvRound((edge[i].y + 0.5) * pixel.height));
+            const bool across_the_seam = std::abs(at.x - before.x) > picture.cols / 2;
+            if (i > 0 && !across_the_seam) cv::line(picture, before, at, color, 1, cv::LINE_AA);
+            if (at.y < highest.y) highest = at;
+            before = at;
         }
     }
-    const Eigen::Vector3d top = track.box.center_m + Eigen::Vector3d(0.0, 0.0, 0.5 * track.box.size_m.z());
-    cv::putText(picture, std::to_string(track.id), at(projection.pixel_of(top, track.velocity_mps)) + cv::Point(-6, -6),
-                cv::FONT_HERSHEY_SIMPLEX, 0.5, color, 1, cv::LINE_AA);
+    cv::putText(picture, std::to_string(track.id), highest + cv::Point(-6, -4), cv::FONT_HERSHEY_SIMPLEX, 0.5, color, 1,
+                cv::LINE_AA);
 }
 
 }  // namespace
 
-cv::Mat draw_range_image(const Frame& frame, const ImageProjection& projection) {
+cv::Mat draw_range_image(const Frame& frame, const SensorModel& sensor) {
     const auto& range = frame.cloud.range_m;
     const auto& label = frame.detection.label;
     cv::Mat3b image(range.height(), range.width(), cv::Vec3b(0, 0, 0));
@@ -75,7 +76,7 @@ cv::Mat draw_range_image(const Frame& frame, const ImageProjection& projection) 
     }
     cv::Mat picture = enlarged(image);
     const cv::Size2d pixel = pixel_size(range.height(), range.width());
-    for (const auto& track : frame.detection.tracks) draw_box(picture, track, projection, pixel);
+    for (const auto& track : frame.detection.tracks) draw_box(picture, track, sensor, frame, pixel);
     caption(picture, "frame " + std::to_string(frame.header.sequence) +
                          ": range (near is bright), dynamic mask (red), undecided (orange), track boxes: red dynamic, "
                          "orange undecided, blue static");

@@ -2,15 +2,14 @@
 #pragma once
 
 #include <opencv2/core.hpp>
-#include <vector>
 
 #include "core/types/frame.hpp"
-#include "tools/draw/image_projection.hpp"
+#include "core/types/sensor_model.hpp"
 
 namespace dlod::tools {
 
 /// Range as brightness, pixels labelled dynamic red and undecided orange, the tracks' boxes over it with their ids.
-cv::Mat draw_range_image(const Frame& frame, const ImageProjection& projection);
+cv::Mat draw_range_image(const Frame& frame, const SensorModel& sensor);
 
 /// The residual image as colours from 0 (dark) to `scale_m` and beyond (bright), pixels without a residual black.
 cv::Mat draw_residual_image(const Image<float>& residual_m, double scale_m);

@@ -47,7 +47,6 @@ std::int64_t busiest_frame(const std::filesystem::path& run) {
 }
 
 void draw_frame(const Arguments& arguments) {
-    const RunOutput run(arguments.run);
     const driver::SensorInfo sensor = driver::load_metadata(arguments.metadata);
     daemon::ConfigSources sources;
     if (!arguments.config.empty()) sources.file = arguments.config;
@@ -56,8 +55,7 @@ void draw_frame(const Arguments& arguments) {
     const std::int64_t sequence = arguments.frame >= 0 ? arguments.frame : busiest_frame(arguments.run);
     const ReplayedFrame replayed =
         replay_to(static_cast<std::uint64_t>(sequence), arguments.capture, sensor, config.frames, config.method);
-    save(arguments, "range_image.png",
-         draw_range_image(replayed.frame, ImageProjection(sensor.model, replayed.frame, run.trajectory)));
+    save(arguments, "range_image.png", draw_range_image(replayed.frame, sensor.model));
     save(arguments, "residual_image.png", draw_residual_image(replayed.residual_m, arguments.residual_scale_m));
 }
 
