@@ -1,0 +1,51 @@
+// Faults that a drive has on demand.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "tools/sim/datagram.hpp"
+#include "tools/sim/random.hpp"
+
+namespace dlod::tools::sim {
+
+enum class ImuFault { kNone, kOff, kSilent, kStuck, kSpikes, kAxes };
+
+struct FaultOptions {
+    double loss = 0.0;         ///< share of the lidar packets that never arrive
+    double duplication = 0.0;  ///< share that arrives twice
+    double reordering = 0.0;   ///< share that arrives one to three packets late
+    double corruption = 0.0;   ///< share that is cut short, overwritten, of a stranger, or marked invalid
+    std::vector<std::pair<double, double>> gaps_s;       ///< nothing arrives: from, length
+    std::vector<double> restarts_s;                      ///< the sensor restarts and is away for kRestart_s
+    std::vector<std::pair<double, double>> sectors_deg;  ///< columns that are marked invalid: from, to, by encoder
+    ImuFault imu = ImuFault::kNone;
+
+    static constexpr double kRestart_s = 0.55;
+    bool any() const {
+        return loss > 0.0 || duplication > 0.0 || reordering > 0.0 || corruption > 0.0 || !gaps_s.empty() ||
+               !restarts_s.empty() || !sectors_deg.empty() || imu != ImuFault::kNone;
+    }
+};
+
+enum class PacketFault { kNone, kLost, kDuplicated, kReordered, kCorrupted };
+
+/// As in packets.csv.
+std::string_view name_of(PacketFault fault);
+
+/// True where nothing is sent at a time: a gap, or a sensor that restarts.
+bool is_silent(const FaultOptions& faults, double t);
+
+/// Number of restarts that a sensor has behind it at a time.
+int restarts_before(const FaultOptions& faults, double t);
+
+/// True where the columns of a direction are marked invalid.
+bool in_missing_sector(const FaultOptions& faults, double encoder_deg);
+
+/// What happens to a packet; drawn from its own stream.
+PacketFault draw_fault(const FaultOptions& faults, Random& random);
+
+}  // namespace dlod::tools::sim

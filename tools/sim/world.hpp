@@ -1,0 +1,39 @@
+// What a scene is made of, ready to be scanned.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tools/sim/actor.hpp"
+#include "tools/sim/robot_motion.hpp"
+
+namespace dlod::tools::sim {
+
+struct SceneOptions {
+    std::uint64_t seed = 1;
+    double duration_s = 10.0;
+    bool movers = true;  ///< false: nobody moves, nobody is there
+    RobotOptions robot;
+};
+
+struct World {
+    Mesh still;
+    std::vector<Mesh> shapes = shared_shapes();
+    std::vector<std::unique_ptr<Actor>> actors;  ///< object i + 1 is actor i
+    RobotMotion robot;
+};
+
+struct SceneInfo {
+    std::string_view name;
+    std::string_view summary;
+    World (*build)(const SceneOptions&);
+};
+
+/// All scenes that there are.
+const std::vector<SceneInfo>& scenes();
+
+World build_square(const SceneOptions& options);
+
+}  // namespace dlod::tools::sim
