@@ -1,5 +1,6 @@
 #include "core/removal/dynamic_points_removal.hpp"
 
+#include "core/map/keyframe_cloud.hpp"
 #include "core/types/multiversion.hpp"
 
 namespace dlod {
@@ -74,26 +75,11 @@ void DynamicPointsRemoval::label_pixels(Frame& frame) const {
 }
 
 void DynamicPointsRemoval::fill_keyframe(const Frame& frame, OdometryFeedback& feedback) const {
-    const PointSelection& points = frame.prepared.points;
-    const OdometryResult& odometry = frame.odometry;
-    KeyframeCloud& cloud = feedback.keyframe;
-    for (auto* v : {&cloud.x, &cloud.y, &cloud.z, &cloud.nx, &cloud.ny, &cloud.nz}) v->clear();
-    cloud.T_world_sensor = odometry.T_world_sensor;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-        const PixelIndex pixel = points.pixel[i];
+    const auto may_move = [&](PixelIndex pixel) {
         const std::uint8_t label = frame.detection.label[pixel];
-        if (label == kDynamic || label == kUndecided) continue;
-        const int p = static_cast<int>(pixel);
-        const auto m = static_cast<std::size_t>(sensor_.measurement_of(p / sensor_.width, p % sensor_.width));
-        const auto& d = odometry.deskew;
-        const float nx = points.nx[i], ny = points.ny[i], nz = points.nz[i];
-        cloud.x.push_back(odometry.x[pixel]);
-        cloud.y.push_back(odometry.y[pixel]);
-        cloud.z.push_back(odometry.z[pixel]);
-        cloud.nx.push_back(d[0][m] * nx + d[1][m] * ny + d[2][m] * nz);
-        cloud.ny.push_back(d[4][m] * nx + d[5][m] * ny + d[6][m] * nz);
-        cloud.nz.push_back(d[8][m] * nx + d[9][m] * ny + d[10][m] * nz);
-    }
+        return label == kDynamic || label == kUndecided;
+    };
+    build_keyframe_cloud(frame, may_move, feedback.keyframe);
     feedback.has_keyframe = true;
 }
 

@@ -40,8 +40,11 @@ class DynamicPointsRemovalTest : public ::testing::Test {
         for (PixelIndex p = 0; p < ground + 1; ++p) {
             auto& points = scene.frame.prepared.points;
             points.pixel.push_back(p);
-            for (auto* v : {&points.x, &points.y, &points.z, &points.nx, &points.ny, &points.planarity, &points.time_s})
-                v->push_back(0.0F);
+            points.measurement.push_back(static_cast<std::uint16_t>(p % 256));
+            points.x.push_back(scene.frame.odometry.x[p]);
+            points.y.push_back(scene.frame.odometry.y[p]);
+            points.z.push_back(scene.frame.odometry.z[p]);
+            for (auto* v : {&points.nx, &points.ny, &points.planarity, &points.time_s}) v->push_back(0.0F);
             points.nz.push_back(1.0F);
         }
         for (int r = 0; r < 3; ++r) {
