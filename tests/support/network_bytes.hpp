@@ -301,8 +301,8 @@ class ScratchFolder {
     std::filesystem::path path_;
 };
 
-/// Iterations of a randomised test: DLOD_FUZZ_ITERATIONS, else `usual`.
-inline int fuzz_iterations(int usual) {
+/// Packets of a randomised test: DLOD_FUZZ_ITERATIONS, else `usual`.
+inline int fuzz_packets(int usual) {
     const char* configured = std::getenv("DLOD_FUZZ_ITERATIONS");
     return configured != nullptr ? std::atoi(configured) : usual;
 }
