@@ -1,0 +1,72 @@
+#include "daemon/status/status_board.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/synthetic_frame.hpp"
+
+namespace dlod::daemon {
+namespace {
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+
+class StatusBoardTest : public testing::Test {
+  protected:
+    StatusBoardTest() : board_("1.2.3", "OS-0-32 123456", kSecond), frame_(test::small_sensor()) {
+        frame_.odometry.valid = true;
+    }
+
+    const status_t& at(double seconds, CounterList counters, double last_packet_s) {
+        const auto ns = [](double s) { return static_cast<std::int64_t>(1e9 * s); };
+        return board_.compose(counters, ns(last_packet_s), ns(seconds), 42);
+    }
+    void pose_at(double seconds) { board_.add(frame_, static_cast<std::int64_t>(1e9 * seconds)); }
+
+    StatusBoard board_;
+    PipelineFrame frame_;
+};
+
+TEST_F(StatusBoardTest, RatesAreOverTheTimeSinceTheLastStatus) {
+    at(2.0, {{"lidar_packets", 640}, {"frames", 10}}, 2.0);
+    for (int i = 0; i < 18; ++i) pose_at(2.0 + 0.1 * i);
+    const auto& status = at(4.0, {{"lidar_packets", 1920}, {"frames", 30}}, 4.0);
+    EXPECT_DOUBLE_EQ(status.packet_rate, 640.0);
+    EXPECT_DOUBLE_EQ(status.frame_rate, 10.0);
+    EXPECT_DOUBLE_EQ(status.pose_rate, 9.0);
+    EXPECT_EQ(status.pose_age, 300'000);
+    EXPECT_EQ(status.uptime, 3'000'000);
+    EXPECT_EQ(status.health, status_t::OK) << status.health_text;
+    ASSERT_EQ(status.counters, 2);
+    EXPECT_EQ(status.counter_name[1], "frames");
+    EXPECT_EQ(status.counter_value[1], 30);
+    EXPECT_GT(status.memory, 0);
+}
+
+TEST_F(StatusBoardTest, PercentilesAreOfTheLastFrames) {
+    for (int i = 1; i <= 100; ++i) {
+        frame_.latency_ms = static_cast<float>(i);
+        pose_at(2.0);
+    }
+    const auto& status = at(2.0, {}, 2.0);
+    ASSERT_EQ(status.stage_name.back(), "latency");
+    EXPECT_EQ(status.stage_p50.back(), 50.0F);
+    EXPECT_EQ(status.stage_p99.back(), 99.0F);
+    EXPECT_EQ(status.stage_max.back(), 100.0F);
+}
+
+TEST_F(StatusBoardTest, HealthSaysWhatIsWrongAndWhatToDo) {
+    EXPECT_EQ(at(2.0, {}, 0.0).health, status_t::WAITING);
+    EXPECT_NE(board_.one_line().find("no packets"), std::string::npos) << board_.one_line();
+    pose_at(3.0);
+    EXPECT_EQ(at(3.0, {}, 3.0).health, status_t::OK);
+    EXPECT_EQ(at(4.0, {{"kernel_drops", 5}}, 4.0).health, status_t::DEGRADED);
+    EXPECT_NE(board_.one_line().find("net.core.rmem_max"), std::string::npos) << board_.one_line();
+    for (int second = 5; second < 14; ++second) pose_at(second);
+    EXPECT_EQ(at(13.5, {{"kernel_drops", 5}}, 13.5).health, status_t::DEGRADED) << "remembered for ten seconds";
+    pose_at(15.0);
+    EXPECT_EQ(at(15.0, {{"kernel_drops", 5}}, 15.0).health, status_t::OK);
+    EXPECT_EQ(at(20.0, {{"kernel_drops", 5}}, 20.0).health, status_t::FAULT) << "packets, but no pose for five seconds";
+    EXPECT_EQ(at(30.0, {{"kernel_drops", 5}}, 20.0).health, status_t::WAITING);
+}
+
+}  // namespace
+}  // namespace dlod::daemon
