@@ -9,7 +9,7 @@ namespace dlod {
 namespace {
 
 constexpr double kInside_m = 0.15;    // the middle of a covered track lies at most this far outside of the detection
-constexpr double kLarger = 1.35;      // a detection of several objects has a footprint that much larger than one's
+constexpr double kLonger = 1.25;      // a detection of several objects is so much longer than each
 constexpr double kSameObject = 0.35;  // tracks that share more of their footprints are one object seen twice
 constexpr std::size_t kMinPart = 10;  // pixels
 
@@ -33,7 +33,7 @@ void MergedDetections::divide(Frame& frame, DetectionShapes& shapes, std::span<c
     for (std::size_t i = 0; i < count; ++i) {
         const Detection& detection = frame.detection.detections[i];
         covered_.clear();
-        double largest = 0.0;
+        double longest = 0.0;
         for (std::size_t t = 0; t < tracks.size(); ++t) {
             if (!tracks[t].steady || !covers(detection, tracks[t].visible)) continue;
             const bool twice = std::any_of(covered_.begin(), covered_.end(), [&](std::size_t other) {
@@ -41,9 +41,10 @@ void MergedDetections::divide(Frame& frame, DetectionShapes& shapes, std::span<c
             });
             if (twice) continue;
             covered_.push_back(t);
-            largest = std::max(largest, area(tracks[t].visible));
+            longest = std::max(longest, tracks[t].visible.size_m.head<2>().maxCoeff());
         }
-        if (covered_.size() > 1 && area(detection.box) > kLarger * largest) divide_one(frame, shapes, tracks, i);
+        if (covered_.size() > 1 && detection.box.size_m.head<2>().maxCoeff() > kLonger * longest)
+            divide_one(frame, shapes, tracks, i);
     }
 }
 

@@ -32,7 +32,7 @@ struct RegisteredDisplacement {
     Eigen::Vector2d displacement_m = Eigen::Vector2d::Zero();  ///< ground plane, that fits best
     double stayed_m2 = 0.0;  ///< mean squared distance to the tangent planes without displacement, outliers bounded
     double moved_m2 = 0.0;   ///< likewise with it
-    double in_place = 1.0;  ///< share of the points that still lie where the surface was
+    double in_place = 1.0;   ///< share of the points that still lie where the surface was
     /// How well the normals fix a displacement in the direction where they do so least; 0.5: in all directions alike.
     double observable = 0.0;
 };

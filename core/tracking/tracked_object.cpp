@@ -41,7 +41,7 @@ OrientedBox TrackedObject::visible_box(const Frame& frame, const DetectionShapes
     };
     OrientedBox all = box_of(sighting.detections.front());
     const Eigen::Matrix3d R = Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-    for (std::size_t d : sighting.detections.subspan(1)) {
+    for (std::size_t d : sighting.detections.subspan(1, sighting.shape_parts - 1)) {
         const OrientedBox part = box_of(d);
         const Eigen::Vector3d offset = R.transpose() * (part.center_m - all.center_m);
         const Eigen::Vector3d low = (-0.5 * all.size_m).cwiseMin(offset - 0.5 * part.size_m);

@@ -16,6 +16,7 @@ namespace dlod {
 /// The detections of one frame that belong to one track: an occluder may split an object into several.
 struct Sighting {
     std::span<const std::size_t> detections;  ///< indices into the frame's, the largest part first; at least one
+    std::size_t shape_parts = 1;  ///< so many of them, the first ones, say where and how large the object is
     Visibility visibility;
 };
 

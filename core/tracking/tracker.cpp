@@ -71,7 +71,8 @@ struct Tracker::State {
     Association association;
     std::vector<ExpectedTrack> expected;
     std::vector<CandidateDetection> candidates;
-    std::vector<int> owner;          ///< of each detection: index into objects, -1 none
+    std::vector<int> owner;  ///< of each detection: index into objects, -1 none
+    std::vector<char> limb;  ///< of each detection: 1 beside its object's box: belongs to it, but does not shape it
     std::vector<std::size_t> parts;  ///< detections of the object at hand
 };
 
@@ -120,6 +121,7 @@ void Tracker::State::associate(Frame& frame) {
 void Tracker::State::attach_parts(Frame& frame) {
     const auto& detections = frame.detection.detections;
     const std::vector<int> matched = owner;
+    limb.assign(detections.size(), 0);
     for (std::size_t d = 0; d < detections.size(); ++d) {
         const int own = matched[d];
         if (own >= 0 && objects[static_cast<std::size_t>(own)].hits() >= kYoungHits) continue;
@@ -133,13 +135,14 @@ void Tracker::State::attach_parts(Frame& frame) {
             if (candidates[d].motion * expected[t].motion < -0.2) continue;
             const OrientedBox box = host.box();
             if (height_gap_m(box, detections[d].box) > kMaxGap_m) continue;
-            const bool limb = host.state() == DynamicState::kDynamic && own < 0 &&
-                              kLimb * detections[d].count < detections[other].count;
-            const double reach = limb ? kLimbMargin_m : kPartMargin_m;
+            const bool small = host.state() == DynamicState::kDynamic && own < 0 &&
+                               kLimb * detections[d].count < detections[other].count;
+            const double reach = small ? kLimbMargin_m : kPartMargin_m;
             const double distance = footprint_distance_m(box, detections[d].centroid_m) / reach;
             if (distance < best) {
                 best = distance;
                 owner[d] = matched[other];
+                limb[d] = distance * reach > kPartMargin_m ? 1 : 0;
             }
         }
     }
@@ -151,10 +154,13 @@ Sighting Tracker::State::sighting_of(const Frame& frame, std::size_t t) {
     for (std::size_t d = 0; d < detections.size(); ++d) {
         if (owner[d] == static_cast<int>(t)) parts.push_back(d);
     }
-    std::stable_sort(parts.begin(), parts.end(),
-                     [&](std::size_t a, std::size_t b) { return detections[a].count > detections[b].count; });
+    std::stable_sort(parts.begin(), parts.end(), [&](std::size_t a, std::size_t b) {
+        return limb[a] != limb[b] ? limb[a] < limb[b] : detections[a].count > detections[b].count;
+    });
     Sighting sighting;
     sighting.detections = parts;
+    sighting.shape_parts = static_cast<std::size_t>(
+        std::count_if(parts.begin(), parts.end(), [&](std::size_t d) { return limb[d] == 0; }));
     sighting.visibility.sensor_m = frame.odometry.T_world_sensor.translation();
     for (std::size_t d : parts) {
         sighting.visibility.occluded_left |= detections[d].occluded_left;
