@@ -1,20 +1,23 @@
 #include "core/tracking/dynamic_state.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace dlod {
 
 namespace {
 
-constexpr int kMinTested = 5;         // points: fewer say nothing about free space
-constexpr double kPatience = 10.0;    // tested points that count for half of full trust
-constexpr double kTall_m = 0.4;       // detections of that height count in full
-constexpr double kUnconfirmed = 0.3;  // trust in a displacement where no free space was tested
-constexpr double kMaxLogOdds = 8.0;   // bounds keep a belief reversible
-constexpr double kMaxStep = 3.0;      // one frame alone never decides
-constexpr double kAway_m = 0.15;      // from the mean place of rest
-constexpr double kRestMean = 0.1;     // weight of a new position in that mean
-constexpr int kAwayDetections = 2;    // in a row off the place of rest: it has set off
+constexpr int kMinTested = 5;          // points: fewer say nothing about free space
+constexpr double kPatience = 10.0;     // tested points that count for half of full trust
+constexpr double kFewTested = 40.0;    // points: with more, a smaller share is neutral, down to
+constexpr double kLeastNeutral = 0.3;  // this part of free_fraction
+constexpr double kTall_m = 0.4;        // detections of that height count in full
+constexpr double kUnconfirmed = 0.3;   // trust in a displacement where no free space was tested
+constexpr double kMaxLogOdds = 8.0;    // bounds keep a belief reversible
+constexpr double kMaxStep = 3.0;       // one frame alone never decides
+constexpr double kAway_m = 0.15;       // from the mean place of rest
+constexpr double kRestMean = 0.1;      // weight of a new position in that mean
+constexpr int kAwayDetections = 2;     // in a row off the place of rest: it has set off
 
 }  // namespace
 
@@ -34,9 +37,13 @@ double motion_log_odds(const MotionCues& cues, const DynamicStateConfig& config)
             const double known = tested / (tested + cues.unknown_points);
             // A single row is as often an edge seen at a grazing angle as a thing of its own.
             const double tall = std::min(1.0, cues.height_m / kTall_m);
-            sum += config.free_weight * (share - config.free_fraction) * known * tall * tested / (tested + kPatience);
-            // What has moved stands, at least with its front, where free space was.
-            trust_in_displacement = std::min(1.0, share / config.free_fraction);
+            // Errors come in a few pixels: the more were tested, the smaller a share is believed in. Of a long object
+            // that sets off only the front stands where free space was.
+            const double neutral =
+                config.free_fraction * std::clamp(std::sqrt(kFewTested / tested), kLeastNeutral, 1.0);
+            const double excess = std::clamp(share / neutral - 1.0, -1.0, 2.0);
+            sum += config.free_weight * excess * known * tall * tested / (tested + kPatience);
+            trust_in_displacement = std::min(1.0, share / neutral);
         }
     }
     if (config.use_residual && cues.residual_points > 0 && cues.height_m > 0.0) {

@@ -9,9 +9,10 @@ namespace dlod {
 namespace {
 
 constexpr double kInside_m = 0.15;    // the middle of a covered track lies at most this far outside of the detection
-constexpr double kLonger = 1.25;      // a detection of several objects is so much longer than each
+constexpr double kLonger = 1.1;       // a detection of several objects is so much longer than each
 constexpr double kSameObject = 0.35;  // tracks that share more of their footprints are one object seen twice
-constexpr std::size_t kMinPart = 10;  // pixels
+constexpr double kMinPart = 10;       // pixels of each part
+constexpr double kMinShare = 0.25;    // of those that its track had: it was not hidden meanwhile
 
 double area(const OrientedBox& box) {
     return box.size_m.x() * box.size_m.y();
@@ -69,7 +70,10 @@ void MergedDetections::divide_one(Frame& frame, DetectionShapes& shapes, std::sp
         }
         ++counts_[owner_[i]];
     }
-    if (*std::min_element(counts_.begin(), counts_.end()) < kMinPart) return;
+    for (std::size_t k = 0; k < covered_.size(); ++k) {
+        const double expected = kMinShare * tracks[covered_[k]].points;
+        if (static_cast<double>(counts_[k]) < std::max(kMinPart, expected)) return;
+    }
 
     // Stable order by owner, in place of the whole.
     pixels_.assign(frame.detection.pixels.begin() + whole.first,

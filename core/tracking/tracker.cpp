@@ -17,9 +17,11 @@ constexpr double kPartMargin_m = 0.15;  // a part's middle lies at most this far
 constexpr double kLimbMargin_m = 0.4;   // and that of a small piece beside a moving object
 constexpr unsigned kLimb = 3;           // small: a third of the object's pixels
 constexpr int kYoungHits = 10;
-constexpr double kSameFootprint = 0.4;  // parts above one another share that much of the smaller footprint
-constexpr double kMaxGap_m = 0.5;       // and are at most that far apart in height
-constexpr double kDuplicate = 0.6;      // an unseen track that shares that much with a seen one is the same object
+constexpr double kStackedOverlap = 0.25;  // share of the smaller height that two halves of one object have in common
+constexpr double kStackedShift_m = 0.4;   // and between their middles in the ground plane
+constexpr double kSameFootprint = 0.4;    // parts above one another share that much of the smaller footprint
+constexpr double kMaxGap_m = 0.5;         // and are at most that far apart in height
+constexpr double kDuplicate = 0.6;        // an unseen track that shares that much with a seen one is the same object
 
 double shared_footprint(const OrientedBox& a, const OrientedBox& b) {
     const double smaller = std::min(a.size_m.x() * a.size_m.y(), b.size_m.x() * b.size_m.y());
@@ -28,6 +30,12 @@ double shared_footprint(const OrientedBox& a, const OrientedBox& b) {
 
 double height_gap_m(const OrientedBox& a, const OrientedBox& b) {
     return std::abs(a.center_m.z() - b.center_m.z()) - 0.5 * (a.size_m.z() + b.size_m.z());
+}
+
+/// One above the other, as a rider and his legs or the halves of a person: separate objects do not stand like that.
+bool stacked(const OrientedBox& a, const OrientedBox& b) {
+    return height_gap_m(a, b) > -kStackedOverlap * std::min(a.size_m.z(), b.size_m.z()) &&
+           (a.center_m - b.center_m).head<2>().norm() < kStackedShift_m;
 }
 
 CandidateDetection candidate(const Detection& detection, const DetectionShape& shape) {
@@ -71,8 +79,9 @@ struct Tracker::State {
     Association association;
     std::vector<ExpectedTrack> expected;
     std::vector<CandidateDetection> candidates;
-    std::vector<int> owner;  ///< of each detection: index into objects, -1 none
-    std::vector<char> limb;  ///< of each detection: 1 beside its object's box: belongs to it, but does not shape it
+    std::vector<int> owner;      ///< of each detection: index into objects, -1 none
+    std::vector<char> absorbed;  ///< of each object: its detection belongs to another one
+    std::vector<char> limb;      ///< of each detection: 1 beside its object's box: belongs to it, but does not shape it
     std::vector<std::size_t> parts;  ///< detections of the object at hand
 };
 
@@ -117,34 +126,42 @@ void Tracker::State::associate(Frame& frame) {
 }
 
 // What is left and lies inside of the box of an object that was found is a part of it, split off by an occluder; small
-// pieces beside a moving one are its limbs. A young track on such a piece gives it up.
+// pieces beside a moving one are its limbs. A young track on such a piece gives it up, and so does the younger of two
+// tracks that stand on top of one another.
 void Tracker::State::attach_parts(Frame& frame) {
     const auto& detections = frame.detection.detections;
     const std::vector<int> matched = owner;
     limb.assign(detections.size(), 0);
+    absorbed.assign(objects.size(), 0);
     for (std::size_t d = 0; d < detections.size(); ++d) {
         const int own = matched[d];
-        if (own >= 0 && objects[static_cast<std::size_t>(own)].hits() >= kYoungHits) continue;
         double best = 1.0;
         for (std::size_t other = 0; other < detections.size(); ++other) {
             if (matched[other] < 0 || matched[other] == own) continue;
             const auto t = static_cast<std::size_t>(matched[other]);
             const TrackedObject& host = objects[t];
-            if (!host.steady() || (own >= 0 && host.hits() < 2 * objects[static_cast<std::size_t>(own)].hits()))
-                continue;
-            if (candidates[d].motion * expected[t].motion < -0.2) continue;
+            if (!host.steady() || candidates[d].motion * expected[t].motion < -0.2) continue;
             const OrientedBox box = host.box();
             if (height_gap_m(box, detections[d].box) > kMaxGap_m) continue;
-            const bool small = host.state() == DynamicState::kDynamic && own < 0 &&
-                               kLimb * detections[d].count < detections[other].count;
-            const double reach = small ? kLimbMargin_m : kPartMargin_m;
-            const double distance = footprint_distance_m(box, detections[d].centroid_m) / reach;
-            if (distance < best) {
-                best = distance;
+            double reach = kPartMargin_m;
+            if (own >= 0) {
+                const TrackedObject& guest = objects[static_cast<std::size_t>(own)];
+                const bool on_top = host.id() < guest.id() && stacked(detections[other].box, detections[d].box);
+                const bool young = guest.hits() < kYoungHits && host.hits() >= 2 * guest.hits();
+                if (!on_top && !young) continue;
+                if (on_top) reach = kLimbMargin_m;
+            } else if (host.state() == DynamicState::kDynamic &&
+                       kLimb * detections[d].count < detections[other].count) {
+                reach = kLimbMargin_m;
+            }
+            const double distance_m = footprint_distance_m(box, detections[d].centroid_m);
+            if (distance_m < best * reach) {
+                best = distance_m / reach;
                 owner[d] = matched[other];
-                limb[d] = distance * reach > kPartMargin_m ? 1 : 0;
+                limb[d] = distance_m > kPartMargin_m ? 1 : 0;
             }
         }
+        if (own >= 0 && owner[d] != own) absorbed[static_cast<std::size_t>(own)] = 1;
     }
 }
 
@@ -181,6 +198,7 @@ void Tracker::State::see_and_miss(Frame& frame) {
     // Two tracks on one object: the one that was not seen goes.
     const auto duplicate = [&](const TrackedObject& object) {
         if (object.seen()) return false;
+        if (absorbed[static_cast<std::size_t>(&object - objects.data())] != 0) return true;
         return std::any_of(objects.begin(), objects.end(), [&](const TrackedObject& other) {
             return other.seen() && shared_footprint(object.box(), other.box()) > kDuplicate;
         });

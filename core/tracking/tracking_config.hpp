@@ -75,8 +75,8 @@ struct DynamicStateConfig {
     int min_hits = 2;
     double dynamic_log_odds = 3.5;
     double static_log_odds = -3.0;
-    double free_weight = 6.0;
-    double free_fraction = 0.2;
+    double free_weight = 1.4;
+    double free_fraction = 0.35;
     double residual_weight = 0.3;
     double displacement_weight = 1.0;
     double rest_time_s = 3.0;
@@ -103,9 +103,11 @@ struct DynamicStateConfig {
         v.parameter("static_log_odds", static_log_odds, Range{-50.0, -0.1}, "1",
                     "log-odds of motion at which an undecided track becomes static");
         v.parameter("free_weight", free_weight, Range{0.0, 50.0}, "1",
-                    "log-odds a frame for each unit of the free share above free_fraction");
-        v.parameter("free_fraction", free_fraction, Range{0.0, 1.0}, "1",
-                    "share of tested points in once free space that speaks neither for nor against motion");
+                    "log-odds of a frame whose free share is twice the neutral one; higher decides earlier");
+        v.parameter(
+            "free_fraction", free_fraction, Range{0.01, 1.0}, "1",
+            "share of the tested points in once free space that speaks neither for nor against motion, for up to "
+            "40 points; less for more; higher is later and surer");
         v.parameter("residual_weight", residual_weight, Range{0.0, 50.0}, "1",
                     "log-odds a frame for each unit of residual over its threshold");
         v.parameter("displacement_weight", displacement_weight, Range{0.0, 50.0}, "1",
