@@ -7,17 +7,18 @@ namespace dlod {
 
 namespace {
 
-constexpr int kMinTested = 5;          // points: fewer say nothing about free space
-constexpr double kPatience = 10.0;     // tested points that count for half of full trust
-constexpr double kFewTested = 40.0;    // points: with more, a smaller share is neutral, down to
-constexpr double kLeastNeutral = 0.3;  // this part of free_fraction
-constexpr double kTall_m = 0.4;        // detections of that height count in full
-constexpr double kUnconfirmed = 0.3;   // trust in a displacement where no free space was tested
-constexpr double kMaxLogOdds = 8.0;    // bounds keep a belief reversible
-constexpr double kMaxStep = 3.0;       // one frame alone never decides
-constexpr double kAway_m = 0.15;       // from the mean place of rest
-constexpr double kRestMean = 0.1;      // weight of a new position in that mean
-constexpr int kAwayDetections = 2;     // in a row off the place of rest: it has set off
+constexpr int kMinTested = 5;             // points: fewer say nothing about free space
+constexpr double kPatience = 10.0;        // tested points that count for half of full trust
+constexpr double kFewTested = 40.0;       // points: with more, a smaller share is neutral, down to
+constexpr double kLeastNeutral = 0.3;     // this part of free_fraction
+constexpr double kTall_m = 0.4;           // detections of that height count in full
+constexpr double kMostUnconfirmed = 0.6;  // of what makes an object dynamic, without free space
+constexpr double kUnconfirmed = 0.3;      // trust in a displacement where no free space was tested
+constexpr double kMaxLogOdds = 8.0;       // bounds keep a belief reversible
+constexpr double kMaxStep = 3.0;          // one frame alone never decides
+constexpr double kAway_m = 0.15;          // from the mean place of rest
+constexpr double kRestMean = 0.1;         // weight of a new position in that mean
+constexpr int kAwayDetections = 2;        // in a row off the place of rest: it has set off
 
 }  // namespace
 
@@ -28,10 +29,11 @@ double free_share(const MotionCues& cues) {
 
 double motion_log_odds(const MotionCues& cues, const DynamicStateConfig& config) {
     double sum = 0.0;
-    double trust_in_displacement = 1.0;
+    double trust =
+        1.0;  // in what speaks for motion: what has moved stands, at least with its front, where free space was
     if (config.use_free_space) {
         const double share = free_share(cues);
-        trust_in_displacement = kUnconfirmed;
+        trust = kUnconfirmed;
         if (share >= 0.0) {
             const double tested = cues.free_points + cues.occupied_points;
             const double known = tested / (tested + cues.unknown_points);
@@ -43,16 +45,17 @@ double motion_log_odds(const MotionCues& cues, const DynamicStateConfig& config)
                 config.free_fraction * std::clamp(std::sqrt(kFewTested / tested), kLeastNeutral, 1.0);
             const double excess = std::clamp(share / neutral - 1.0, -1.0, 2.0);
             sum += config.free_weight * excess * known * tall * tested / (tested + kPatience);
-            trust_in_displacement = std::min(1.0, share / neutral);
+            trust = known * std::min(1.0, share / neutral);
         }
     }
     if (config.use_residual && cues.residual_points > 0 && cues.height_m > 0.0) {
         const double ratio = cues.average_residual_m / std::max(1e-3, config.theta_res * cues.height_m);
-        sum += config.residual_weight * std::clamp(ratio - 1.0, -1.0, 2.0);
+        const double excess = std::clamp(ratio - 1.0, -1.0, 2.0);
+        sum += config.residual_weight * (excess > 0.0 ? trust * excess : excess);
     }
     if (config.use_displacement) {
         const double moved = cues.displacement_log_odds;
-        sum += config.displacement_weight * (moved > 0.0 ? trust_in_displacement * moved : moved);
+        sum += config.displacement_weight * (moved > 0.0 ? trust * moved : moved);
     }
     return std::clamp(sum, -kMaxStep, kMaxStep);
 }
@@ -90,7 +93,12 @@ void MotionBelief::rest(const MotionCues& cues, const DynamicStateConfig& config
 }
 
 DynamicState MotionBelief::fused(const MotionCues& cues, const DynamicStateConfig& config) {
-    log_odds_ = std::clamp(log_odds_ + motion_log_odds(cues, config), config.static_log_odds - 0.5, kMaxLogOdds);
+    double step = motion_log_odds(cues, config);
+    // What comes into view where nothing was ever seen differs from the map, too: that makes it a suspect, no more.
+    if (config.use_free_space && free_share(cues) < 0.0) {
+        step = std::min(step, std::max(0.0, kMostUnconfirmed * config.dynamic_log_odds - log_odds_));
+    }
+    log_odds_ = std::clamp(log_odds_ + step, config.static_log_odds - 0.5, kMaxLogOdds);
     rest(cues, config);
     if (state_ == DynamicState::kDynamic) {
         rested_ = rest_s_ >= config.rest_time_s;

@@ -152,7 +152,7 @@ void TrackedObject::miss(Sight sight) {
 
 bool TrackedObject::visible_to_others() const {
     if (seen_now_) return true;
-    if (belief_.state() != DynamicState::kDynamic || hits_ < kEstablishedHits) return false;
+    if (belief_.state() != DynamicState::kDynamic || hits_ < kEstablishedHits || unseen_frames_ > hits_) return false;
     return sight_ == Sight::kNearer || sight_ == Sight::kThere ||
            (sight_ == Sight::kUnknown && unseen_frames_ <= kBlindFrames);
 }
