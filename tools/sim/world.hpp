@@ -35,5 +35,10 @@ struct SceneInfo {
 const std::vector<SceneInfo>& scenes();
 
 World build_square(const SceneOptions& options);
+World build_corridor(const SceneOptions& options);
+World build_street(const SceneOptions& options);
+World build_circle(const SceneOptions& options);
+World build_tunnel(const SceneOptions& options);
+World build_slope(const SceneOptions& options);
 
 }  // namespace dlod::tools::sim
