@@ -2,6 +2,17 @@
 
 namespace dlod {
 
+namespace {
+
+/// Without the handling of dynamic objects every point enters the map, at once and for good.
+GlobalMapConfig map_config(const MethodConfig& config) {
+    GlobalMapConfig map = config.map;
+    if (!config.handle_dynamic_objects) map.confirm_s = 0.0;
+    return map;
+}
+
+}  // namespace
+
 DynamicLidarOdometry::DynamicLidarOdometry(const SensorModel& sensor, const MethodConfig& config)
     : handle_dynamic_objects_(config.handle_dynamic_objects),
       subsampling_(sensor, config.subsampling),
@@ -11,7 +22,7 @@ DynamicLidarOdometry::DynamicLidarOdometry(const SensorModel& sensor, const Meth
       detector_(sensor, config.detection),
       tracker_(sensor, config.tracking),
       removal_(sensor, config.removal),
-      map_(sensor, config.map) {}
+      map_(sensor, map_config(config)) {}
 
 void DynamicLidarOdometry::process(Frame& frame) {
     OdometryFeedback& slot = feedback_[frames_ % kFeedbackDelay];
@@ -26,11 +37,17 @@ void DynamicLidarOdometry::process(Frame& frame) {
     ++frames_;
 }
 
-void DynamicLidarOdometry::subsample(Frame& frame) { subsampling_.process(frame); }
+void DynamicLidarOdometry::subsample(Frame& frame) {
+    subsampling_.process(frame);
+}
 
-void DynamicLidarOdometry::remove_ground(Frame& frame) { ground_removal_.process(frame); }
+void DynamicLidarOdometry::remove_ground(Frame& frame) {
+    ground_removal_.process(frame);
+}
 
-void DynamicLidarOdometry::segment(Frame& frame) { segmentation_.process(frame); }
+void DynamicLidarOdometry::segment(Frame& frame) {
+    segmentation_.process(frame);
+}
 
 void DynamicLidarOdometry::estimate_pose(Frame& frame, const OdometryFeedback* feedback) {
     odometry_.process(frame, feedback);

@@ -1,6 +1,5 @@
 #include "core/map/cell_table.hpp"
 
-#include <algorithm>
 #include <utility>
 
 namespace dlod {
@@ -11,8 +10,12 @@ constexpr unsigned kFirstBits = 16;
 
 }  // namespace
 
-CellTable::CellTable(double cell_m)
-    : cell_m_(cell_m), inverse_cell_(1.0 / cell_m), slots_(std::size_t{1} << kFirstBits), shift_(64 - kFirstBits) {}
+CellTable::CellTable(double cell_m, const Persistence::Rule& rule)
+    : cell_m_(cell_m),
+      inverse_cell_(1.0 / cell_m),
+      rule_(rule),
+      slots_(std::size_t{1} << kFirstBits),
+      shift_(64 - kFirstBits) {}
 
 // The slot that holds the key, or the empty one where it would go.
 std::size_t CellTable::slot_of(std::uint64_t key) const {
@@ -27,11 +30,14 @@ void CellTable::insert_new(const Slot& slot) {
     ++size_;
 }
 
-void CellTable::insert(const MapPoint& point) {
+void CellTable::insert(const MapPoint& point, std::uint16_t now_ds) {
     const std::uint64_t key = key_of(point);
     const std::size_t slot = slot_of(key);
-    if (slots_[slot].key == key) return;
-    slots_[slot] = {key, point};
+    if (slots_[slot].key == key) {
+        slots_[slot].seen.see(now_ds, rule_);
+        return;
+    }
+    slots_[slot] = {key, point, Persistence(now_ds, rule_)};
     if (++size_ * 5 > slots_.size() * 3) grow();
 }
 
@@ -63,18 +69,6 @@ void CellTable::grow() {
     for (const Slot& slot : old) {
         if (slot.key != kEmpty) insert_new(slot);
     }
-}
-
-std::vector<MapPoint> CellTable::sorted() const {
-    std::vector<Slot> all;
-    all.reserve(size_);
-    for (const Slot& slot : slots_) {
-        if (slot.key != kEmpty) all.push_back(slot);
-    }
-    std::sort(all.begin(), all.end(), [](const Slot& a, const Slot& b) { return a.key < b.key; });
-    std::vector<MapPoint> points(all.size());
-    std::transform(all.begin(), all.end(), points.begin(), [](const Slot& slot) { return slot.point; });
-    return points;
 }
 
 }  // namespace dlod

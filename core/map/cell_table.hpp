@@ -1,10 +1,13 @@
 // A hash of cubic cells with one point each: the store of the global map.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
+
+#include "core/map/persistence.hpp"
 
 namespace dlod {
 
@@ -16,7 +19,7 @@ struct MapPoint {
 /// Open addressing with linear probing; erasing leaves no tombstones. Grows by doubling, never shrinks by itself.
 class CellTable {
   public:
-    explicit CellTable(double cell_m);
+    explicit CellTable(double cell_m, const Persistence::Rule& rule = {});
 
     std::size_t size() const { return size_; }
     double cell_m() const { return cell_m_; }
@@ -31,8 +34,8 @@ class CellTable {
                 static_cast<std::int32_t>(std::floor(z * inverse_cell_))};
     }
 
-    /// Keeps the point unless its cell holds one already.
-    void insert(const MapPoint& point);
+    /// Keeps the point unless its cell holds one already, which has then been seen again.
+    void insert(const MapPoint& point, std::uint16_t now_ds = 0);
     /// The point of a cell, or nullptr. Valid until the next change.
     const MapPoint* find(const Index& index) const;
     /// Forgets a cell; false where it was empty.
@@ -44,6 +47,8 @@ class CellTable {
     std::size_t slots() const { return slots_.size(); }
     /// The point in a slot, or nullptr.
     const MapPoint* at(std::size_t slot) const { return slots_[slot].key != kEmpty ? &slots_[slot].point : nullptr; }
+    /// When the point in a filled slot was seen.
+    const Persistence& seen(std::size_t slot) const { return slots_[slot].seen; }
 
     /// Forgets the cells for which `keep(point)` is false.
     template <class Keep>
@@ -56,13 +61,29 @@ class CellTable {
         }
     }
 
-    /// All points by ascending cell: the order depends on the cells alone, not on when they came.
-    std::vector<MapPoint> sorted() const;
+    /// The points of all cells for which `take(persistence)` is true, by ascending cell: the order depends on the cells
+    /// alone, not on when they came.
+    template <class Take>
+    std::vector<MapPoint> sorted(Take take) const {
+        std::vector<const Slot*> taken;
+        taken.reserve(size_);
+        for (const Slot& slot : slots_) {
+            if (slot.key != kEmpty && take(slot.seen)) taken.push_back(&slot);
+        }
+        std::sort(taken.begin(), taken.end(), [](const Slot* a, const Slot* b) { return a->key < b->key; });
+        std::vector<MapPoint> points(taken.size());
+        std::transform(taken.begin(), taken.end(), points.begin(), [](const Slot* slot) { return slot->point; });
+        return points;
+    }
+    std::vector<MapPoint> sorted() const {
+        return sorted([](const Persistence&) { return true; });
+    }
 
   private:
     struct Slot {
         std::uint64_t key = kEmpty;
         MapPoint point;
+        Persistence seen;
     };
     static constexpr std::uint64_t kEmpty = ~std::uint64_t{0};
 
@@ -82,6 +103,7 @@ class CellTable {
 
     double cell_m_;
     double inverse_cell_;
+    Persistence::Rule rule_;
     std::vector<Slot> slots_;
     unsigned shift_;
     std::size_t size_ = 0;

@@ -1,6 +1,7 @@
 #include "core/map/global_map.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 
 namespace dlod {
@@ -9,35 +10,59 @@ namespace {
 
 constexpr std::size_t kPrefetch = 12;  // points: about the latency of main memory
 constexpr std::size_t kClearedCellsAFrame = 4000;
+constexpr std::size_t kSweptSlotsAFrame = 4000;
 constexpr double kForgottenShare = 0.1;  // of a full map, at a time
+// A run too short to confirm much: what has stayed for this share of it is static.
+constexpr double kConfirmShareOfRun = 0.25;
+constexpr std::int64_t kDecisecond_ns = 100'000'000;
 
 /// Near pixels lie many to a cell: of each four that are looked at, so many are skipped.
 constexpr float kNear_m = 8.0F, kMiddle_m = 16.0F;
 
 /// What one frame adds and clears, kept until it is its turn.
 struct Postponed {
+    std::int64_t stamp_ns = 0;
     std::vector<MapPoint> points;
     std::vector<OrientedBox> cleared;
 };
+
+Persistence::Rule rule_of(const GlobalMapConfig& config) {
+    return {static_cast<std::uint16_t>(std::lround(10.0 * config.confirm_s)),
+            static_cast<std::uint16_t>(std::lround(10.0 * config.forget_s))};
+}
+
+std::uint16_t deciseconds(std::int64_t stamp_ns) {
+    return static_cast<std::uint16_t>(stamp_ns / kDecisecond_ns);
+}
 
 }  // namespace
 
 struct GlobalMap::State {
     State(const SensorModel& model, const GlobalMapConfig& map)
-        : sensor(model), config(map), cells(map.cell_m), waiting(static_cast<std::size_t>(map.delay_frames) + 1) {
+        : sensor(model),
+          config(map),
+          rule(rule_of(map)),
+          cells(map.cell_m, rule),
+          waiting(static_cast<std::size_t>(map.delay_frames) + 1) {
         for (Postponed& p : waiting) p.points.reserve(sensor.pixels() / 4 + static_cast<std::size_t>(sensor.height));
     }
 
     void postpone(const Frame& frame, Postponed& out);
     void enter(Postponed& postponed);
     void clear_some(std::size_t budget);
+    void sweep_unconfirmed();
     void forget_farthest();
 
     SensorModel sensor;
     GlobalMapConfig config;
+    Persistence::Rule rule;
     CellTable cells;
     std::vector<Postponed> waiting;  ///< ring over the frames
     std::uint64_t frames = 0;
+    std::int64_t first_stamp_ns = 0;
+    std::int64_t last_stamp_ns = 0;
+    std::int64_t entered_stamp_ns = 0;
+    std::size_t sweep_slot = 0;
     std::vector<OrientedBox> to_clear;
     Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
 };
@@ -52,6 +77,7 @@ void GlobalMap::update(const Frame& frame) {
     s.enter(slot);  // what came delay_frames + 1 frames ago
     s.postpone(frame, slot);
     s.clear_some(kClearedCellsAFrame);
+    s.sweep_unconfirmed();
     if (s.cells.size() > static_cast<std::size_t>(s.config.max_points)) s.forget_farthest();
 }
 
@@ -63,13 +89,19 @@ void GlobalMap::finish() {
 }
 
 std::vector<MapPoint> GlobalMap::points() const {
-    return state_->cells.sorted();
+    const State& s = *state_;
+    const double run_ds = static_cast<double>(s.last_stamp_ns - s.first_stamp_ns) / static_cast<double>(kDecisecond_ns);
+    const double enough_ds = std::min<double>(s.rule.confirm_ds, kConfirmShareOfRun * run_ds);
+    return s.cells.sorted([&](const Persistence& seen) { return seen.confirmed() || seen.span_ds() >= enough_ds; });
 }
 
 // Every fourth pixel of each row, shifted from row to row and from frame to frame, so that four frames see all.
 void GlobalMap::State::postpone(const Frame& frame, Postponed& out) {
     out.points.clear();
     out.cleared.clear();
+    out.stamp_ns = frame.header.stamp_ns;
+    if (first_stamp_ns == 0) first_stamp_ns = out.stamp_ns;
+    last_stamp_ns = out.stamp_ns;
     if (!frame.odometry.valid) return;
     position_m = frame.odometry.T_world_sensor.translation();
     out.cleared.assign(frame.detection.cleared.begin(), frame.detection.cleared.end());
@@ -96,9 +128,11 @@ void GlobalMap::State::postpone(const Frame& frame, Postponed& out) {
 
 void GlobalMap::State::enter(Postponed& postponed) {
     const auto& points = postponed.points;
+    if (postponed.stamp_ns != 0) entered_stamp_ns = postponed.stamp_ns;
+    const std::uint16_t now_ds = deciseconds(postponed.stamp_ns);
     for (std::size_t i = 0; i < points.size(); ++i) {
         if (i + kPrefetch < points.size()) cells.prefetch(points[i + kPrefetch]);
-        cells.insert(points[i]);
+        cells.insert(points[i], now_ds);
     }
     // Everything that was seen before the object turned dynamic has entered by now.
     to_clear.insert(to_clear.end(), postponed.cleared.begin(), postponed.cleared.end());
@@ -127,6 +161,20 @@ void GlobalMap::State::clear_some(std::size_t budget) {
         }
     }
     to_clear.erase(to_clear.begin(), to_clear.begin() + static_cast<std::ptrdiff_t>(done));
+}
+
+// A part of the table a frame: what was seen for a moment only does not fill the memory.
+void GlobalMap::State::sweep_unconfirmed() {
+    if (entered_stamp_ns == 0) return;
+    const std::uint16_t now_ds = deciseconds(last_stamp_ns);
+    // Points wait before they enter: what is being seen now is not forgotten meanwhile.
+    const auto stale_ds = static_cast<std::uint16_t>(rule.gap_ds + deciseconds(last_stamp_ns - entered_stamp_ns));
+    for (std::size_t i = 0; i < kSweptSlotsAFrame; ++i) {
+        if (++sweep_slot >= cells.slots()) sweep_slot = 0;
+        const MapPoint* p = cells.at(sweep_slot);
+        if (p == nullptr || cells.seen(sweep_slot).confirmed()) continue;
+        if (cells.seen(sweep_slot).since_last(now_ds) > stale_ds) cells.erase(cells.index_of(p->x, p->y, p->z));
+    }
 }
 
 void GlobalMap::State::forget_farthest() {

@@ -15,6 +15,8 @@ struct GlobalMapConfig {
     double max_range_m = 45.0;
     double min_range_m = 0.3;
     int delay_frames = 5;
+    double confirm_s = 0.8;
+    double forget_s = 4.0;
     int max_points = 5'000'000;
 
     template <class V>
@@ -26,6 +28,12 @@ struct GlobalMapConfig {
                     "nearer points, such as the robot's own, are not mapped");
         v.parameter("delay_frames", delay_frames, Range{0, 50}, "frames",
                     "points wait this long before they enter: what is found to move meanwhile never does");
+        v.parameter(
+            "confirm_s", confirm_s, Range{0.0, 60.0}, "s",
+            "a surface enters the map once it has stayed this long; higher: fewer traces of what moves, and what "
+            "was in view for a shorter time is missing. 0: at once");
+        v.parameter("forget_s", forget_s, Range{0.1, 60.0}, "s",
+                    "a surface that has not been confirmed is forgotten when it is not seen again for this long");
         v.parameter(
             "max_points", max_points, Range{1000, 500'000'000}, "points",
             "bound of the map's size: the cells farthest from the robot are forgotten first; 24 to 40 bytes each");

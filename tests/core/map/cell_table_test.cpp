@@ -46,5 +46,21 @@ TEST(CellTable, RetainsWhatItIsToldTo) {
     for (const MapPoint& p : table.sorted()) EXPECT_GT(p.x, 0.0F);
 }
 
+TEST(CellTable, TellsWhatStayedFromWhatPassed) {
+    CellTable table(0.2, {.confirm_ds = 15, .gap_ds = 30});
+    const MapPoint stays{0.1F, 0.1F, 0.1F}, passes{1.1F, 0.1F, 0.1F}, comes_again{2.1F, 0.1F, 0.1F};
+    for (int t = 0; t < 100; ++t) {
+        // Times near the wrap of the clock.
+        const auto now = static_cast<std::uint16_t>(0x7FF0 + t);
+        table.insert(stays, now);
+        if (t < 10) table.insert(passes, now);
+        if (t % 40 < 8) table.insert(comes_again, now);
+    }
+    const auto confirmed = table.sorted([](const Persistence& seen) { return seen.confirmed(); });
+    ASSERT_EQ(confirmed.size(), 1U);
+    EXPECT_EQ(confirmed[0].x, stays.x);
+    EXPECT_EQ(table.size(), 3U);
+}
+
 }  // namespace
 }  // namespace dlod

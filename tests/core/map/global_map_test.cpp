@@ -106,6 +106,7 @@ TEST_F(GlobalMapTest, FramesWithoutAPoseAndFarPointsStayOut) {
 }
 
 TEST_F(GlobalMapTest, IsBoundedAndForgetsTheFarthest) {
+    config.confirm_s = 0.0;  // each place is seen for a moment only
     config.max_points = 2000;
     GlobalMap map(sensor, config);
     for (int k = 0; k < 100; ++k) {
@@ -134,6 +135,18 @@ TEST_F(GlobalMapTest, TheOrderOfPointsIsThatOfTheCells) {
     ASSERT_EQ(pa.size(), pb.size());
     for (std::size_t i = 0; i < pa.size(); ++i)
         EXPECT_TRUE(pa[i].x == pb[i].x && pa[i].y == pb[i].y && pa[i].z == pb[i].z);
+}
+
+// What passes through a place for less than confirm_s leaves no trace, even where no track has found it.
+TEST_F(GlobalMapTest, WhatPassesLeavesNoTrace) {
+    GlobalMap map(sensor, config);
+    for (int k = 0; k < 60; ++k) {
+        see_wall(k >= 20 && k < 28 ? 3.0 : 5.0);
+        map.update(scene.frame);
+    }
+    map.finish();
+    EXPECT_EQ(count_at(map, 3.0), 0);
+    EXPECT_GT(count_at(map, 5.0), 700);
 }
 
 }  // namespace
