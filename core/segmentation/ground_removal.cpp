@@ -82,7 +82,7 @@ DLOD_MULTIVERSION void follow_ground_row(int width, const float* __restrict dist
 }  // namespace
 
 GroundRemoval::GroundRemoval(const SensorModel& sensor, const GroundRemovalConfig& config)
-    : sensor_(sensor), config_(config), distance_(sensor.height, sensor.width), height_(sensor.height, sensor.width) {
+    : sensor_(sensor), config_(config), distance_(kRows, sensor.width), height_(kRows, sensor.width) {
     const auto width = static_cast<std::size_t>(sensor.width);
     for (auto* v : {&line_distance_, &line_height_, &line_slope_, &line_started_}) v->assign(width, 0.0F);
     for (std::size_t r = 0; r < static_cast<std::size_t>(sensor.height); ++r) {
@@ -102,33 +102,49 @@ void GroundRemoval::update_up(const Frame& frame) {
     if (std::abs(mean.norm() - 9.81F) < 2.0F) up_ = mean.normalized();
 }
 
-void GroundRemoval::update_sensor_height() {
+int GroundRemoval::top_row() const {
+    constexpr double kSteepest_rad = 0.35;  // hills seen from below
+    const double highest = kSteepest_rad + std::acos(std::clamp(static_cast<double>(up_.z()), -1.0, 1.0));
+    int row = 0;
+    while (row + 1 < sensor_.height &&
+           static_cast<double>(sensor_.altitude_rad[static_cast<std::size_t>(row)]) > highest)
+        ++row;
+    return row;
+}
+
+void GroundRemoval::update_sensor_height(const StructuredCloud& cloud) {
     // Height of the lowest well populated level of flat returns around the sensor.
     std::fill(histogram_.begin(), histogram_.end(), 0);
     const auto max_slope = static_cast<float>(std::tan(config_.max_slope_rad));
-    constexpr int kColumnStep = 4;
-    for (int r = sensor_.height - 1; r >= kRowsAbove; --r) {
-        if (sensor_.altitude_rad[static_cast<std::size_t>(r)] > 0.2F) continue;
-        const float* distance = distance_.row(r);
-        const float* height = height_.row(r);
-        const float* distance_above = distance_.row(r - kRowsAbove);
-        const float* height_above = height_.row(r - kRowsAbove);
+    const auto min_range = static_cast<float>(config_.min_range_m);
+    const auto highest = static_cast<float>(-config_.min_sensor_height_m);
+    constexpr int kColumnStep = 8;
+    constexpr float kFarthest_m = 15.0F;
+    for (int r = sensor_.height - 1; r >= std::max(kRowsAbove, top_row()); --r) {
         const float wall_rise = wall_rise_[static_cast<std::size_t>(r)];
         for (int c = 0; c < sensor_.width; c += kColumnStep) {
-            const float run = distance_above[c] - distance[c];
-            if (distance[c] == 0.0F || distance_above[c] == 0.0F || run <= 0.0F || distance[c] > 15.0F) continue;
-            if (std::abs(height_above[c] - height[c]) > max_slope * run + kNoiseShare * wall_rise * distance[c])
+            const Eigen::Vector3f here(cloud.x(r, c), cloud.y(r, c), cloud.z(r, c));
+            const Eigen::Vector3f above(cloud.x(r - kRowsAbove, c), cloud.y(r - kRowsAbove, c),
+                                        cloud.z(r - kRowsAbove, c));
+            const float height = up_.dot(here);
+            const float range = cloud.range_m(r, c);
+            if (height > highest || range < min_range || range > kFarthest_m ||
+                cloud.range_m(r - kRowsAbove, c) == 0.0F)
                 continue;
-            const double below = -static_cast<double>(height[c]) - config_.min_sensor_height_m;
-            if (below < 0.0) continue;
-            const auto bin = static_cast<std::size_t>(below / kHistogramBin_m);
+            const float height_above = up_.dot(above);
+            const float distance = std::sqrt(std::max(0.0F, here.squaredNorm() - height * height));
+            const float run = std::sqrt(std::max(0.0F, above.squaredNorm() - height_above * height_above)) - distance;
+            if (run <= 0.0F || std::abs(height_above - height) > max_slope * run + kNoiseShare * wall_rise * distance)
+                continue;
+            const auto bin = static_cast<std::size_t>((-static_cast<double>(height) - config_.min_sensor_height_m) /
+                                                      kHistogramBin_m);
             if (bin + 1 < histogram_.size()) ++histogram_[bin];
         }
     }
     const auto level = [this](std::size_t bin) { return histogram_[bin] + histogram_[bin + 1]; };
     int most = 0;
     for (std::size_t bin = 0; bin + 1 < histogram_.size(); ++bin) most = std::max(most, level(bin));
-    constexpr int kFewest = 16;
+    constexpr int kFewest = 8;
     if (most < kFewest) return;
     for (std::size_t bin = histogram_.size() - 1; bin-- > 0;) {
         if (level(bin) * 5 < most * 2) continue;
@@ -143,12 +159,7 @@ void GroundRemoval::update_sensor_height() {
 
 void GroundRemoval::process(Frame& frame) {
     update_up(frame);
-    const StructuredCloud& cloud = frame.cloud;
-    for (int r = 0; r < sensor_.height; ++r) {
-        cylindrical_row(sensor_.width, cloud.x.row(r), cloud.y.row(r), cloud.z.row(r), up_.x(), up_.y(), up_.z(),
-                        static_cast<float>(config_.min_range_m), distance_.row(r), height_.row(r));
-    }
-    update_sensor_height();
+    update_sensor_height(frame.cloud);
     if (sensor_height_m_ == 0.0) {
         frame.prepared.ground.fill(0);
         return;
@@ -160,12 +171,23 @@ void GroundRemoval::process(Frame& frame) {
     const LineFilterParameters parameters{
         static_cast<float>(std::tan(config_.max_slope_rad)), static_cast<float>(config_.height_tolerance_m),
         static_cast<float>(config_.slope_tolerance), static_cast<float>(config_.max_step_m)};
-    for (int r = sensor_.height - 1; r >= 0; --r) {
+    const StructuredCloud& cloud = frame.cloud;
+    const auto prepare_row = [&](int r) {
+        cylindrical_row(sensor_.width, cloud.x.row(r), cloud.y.row(r), cloud.z.row(r), up_.x(), up_.y(), up_.z(),
+                        static_cast<float>(config_.min_range_m), distance_.row(r % kRows), height_.row(r % kRows));
+    };
+    const int bottom = sensor_.height - 1;
+    const int top = top_row();
+    for (int r = bottom; r > bottom - kRowsAbove && r >= 0; --r) prepare_row(r);
+    for (int r = bottom; r >= top; --r) {
         const int above = std::max(r - kRowsAbove, 0);
-        follow_ground_row(sensor_.width, distance_.row(r), height_.row(r), distance_.row(above), height_.row(above),
-                          parameters, wall_rise_[static_cast<std::size_t>(r)], line_distance_.data(),
-                          line_height_.data(), line_slope_.data(), line_started_.data(), frame.prepared.ground.row(r));
+        if (r >= kRowsAbove) prepare_row(above);
+        follow_ground_row(sensor_.width, distance_.row(r % kRows), height_.row(r % kRows), distance_.row(above % kRows),
+                          height_.row(above % kRows), parameters, wall_rise_[static_cast<std::size_t>(r)],
+                          line_distance_.data(), line_height_.data(), line_slope_.data(), line_started_.data(),
+                          frame.prepared.ground.row(r));
     }
+    std::fill(frame.prepared.ground.data(), frame.prepared.ground.row(top), std::uint8_t{0});
 }
 
 }  // namespace dlod

@@ -54,14 +54,18 @@ class GroundRemoval {
 
   private:
     void update_up(const Frame& frame);
-    void update_sensor_height();
+    void update_sensor_height(const StructuredCloud& cloud);
+    /// Rows above this one look too far up to see ground.
+    int top_row() const;
 
     SensorModel sensor_;
     GroundRemovalConfig config_;
     Eigen::Vector3f up_ = Eigen::Vector3f::UnitZ();
     double sensor_height_m_ = 0.0;
-    Image<float> distance_;  ///< horizontal distance from the sensor; 0: no return, or too near
-    Image<float> height_;    ///< along up_, above the sensor
+    /// Of the row at hand and those that its slopes are taken to, [kRows][W]: horizontal distance from the sensor (0:
+    /// no return, or too near) and height along up_.
+    static constexpr int kRows = 3;
+    Image<float> distance_, height_;
     AlignedVector<float> line_distance_, line_height_, line_slope_, line_started_;  ///< [W] the columns' line filters
     AlignedVector<float> wall_rise_;  ///< [H] difference of the beams' tangents to the row that slopes are taken to
     AlignedVector<int> histogram_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <numbers>
 #include <utility>
 
@@ -11,10 +12,12 @@ namespace dlod {
 namespace {
 
 DLOD_MULTIVERSION void select_row(int width, const float* __restrict range, const std::uint8_t* __restrict ground,
-                                  float min_range, float max_range, float* __restrict selected) {
+                                  float min_range, float max_range, float* __restrict selected,
+                                  std::uint8_t* __restrict used) {
     for (int c = 0; c < width; ++c) {
         const bool use = (ground[c] == 0) & (range[c] >= min_range) & (range[c] <= max_range);
         selected[c] = use ? range[c] : 0.0F;
+        used[c] = use ? 1 : 0;
     }
 }
 
@@ -34,7 +37,18 @@ float ratio_of(double alpha_rad, double theta_rad) {
     return static_cast<float>(std::cos(alpha_rad) + std::sin(alpha_rad) / std::tan(theta_rad));
 }
 
+constexpr std::size_t kBoundsStep = 4;
+
 }  // namespace
+
+void RangeImageSegmentation::Bounds::include(const StructuredCloud& cloud, std::size_t pixel) {
+    const float point[3] = {cloud.x[pixel], cloud.y[pixel], cloud.z[pixel]};
+    for (int i = 0; i < 3; ++i) {
+        low[i] = point[i] < low[i] ? point[i] : low[i];
+        high[i] = point[i] > high[i] ? point[i] : high[i];
+    }
+    range = std::max(range, cloud.range_m[pixel]);
+}
 
 RangeImageSegmentation::RangeImageSegmentation(const SensorModel& sensor, const SegmentationConfig& config)
     : sensor_(sensor),
@@ -49,12 +63,12 @@ RangeImageSegmentation::RangeImageSegmentation(const SensorModel& sensor, const 
     }
     right_.assign(width, 0);
     down_.assign(width, 0);
-    run_above_.assign(width, 0);
-    run_here_.assign(width, 0);
+    used_.assign(width, 0);
     runs_.reserve(sensor.pixels());
     points_.reserve(sensor.pixels());
     next_pixel_.reserve(4096);
     last_row_.reserve(4096);
+    bounds_.reserve(4096);
 }
 
 std::uint32_t RangeImageSegmentation::find(std::uint32_t run) {
@@ -77,37 +91,58 @@ void RangeImageSegmentation::connect(const Frame& frame) {
     const int width = sensor_.width;
     const auto max_step = static_cast<float>(config_.max_depth_step_m);
     runs_.clear();
+    std::uint32_t above_begin = 0;
     for (int r = 0; r < sensor_.height; ++r) {
         float* range = range_.row(r);
         select_row(width, frame.cloud.range_m.row(r), frame.prepared.ground.row(r),
-                   static_cast<float>(config_.min_range_m), static_cast<float>(config_.max_range_m), range);
+                   static_cast<float>(config_.min_range_m), static_cast<float>(config_.max_range_m), range,
+                   used_.data());
         connect_row(width - 1, range, range + 1, ratio_right_, max_step, right_.data());
         connect_row(1, range + width - 1, range, ratio_right_, max_step, right_.data() + width - 1);
         const auto row_begin = static_cast<std::uint32_t>(runs_.size());
-        for (int c = 0; c < width; ++c) {
-            if (range[c] == 0.0F) continue;
-            const auto run = static_cast<std::uint32_t>(runs_.size());
-            const int first = c;
-            run_here_[static_cast<std::size_t>(c)] = run;
-            while (c + 1 < width && right_[static_cast<std::size_t>(c)] != 0)
-                run_here_[static_cast<std::size_t>(++c)] = run;
-            runs_.push_back({run, 0, static_cast<std::uint16_t>(r), static_cast<std::uint16_t>(first),
-                             static_cast<std::uint16_t>(c)});
-        }
-        if (right_.back() != 0) unite(row_begin, static_cast<std::uint32_t>(runs_.size()) - 1);
+        find_runs(r);
+        const auto row_end = static_cast<std::uint32_t>(runs_.size());
+        if (right_.back() != 0) unite(row_begin, row_end - 1);
         if (r > 0) {
             connect_row(width, range_.row(r - 1), range, ratio_down_[static_cast<std::size_t>(r - 1)], max_step,
                         down_.data());
-            std::uint32_t above = ~0U;
-            std::uint32_t here = ~0U;
-            for (std::size_t c = 0; c < static_cast<std::size_t>(width); ++c) {
-                if (down_[c] == 0 || (run_above_[c] == above && run_here_[c] == here)) continue;
-                above = run_above_[c];
-                here = run_here_[c];
-                unite(above, here);
-            }
+            unite_rows(above_begin, row_begin, row_end);
         }
-        run_above_.swap(run_here_);
+        above_begin = row_begin;
+    }
+}
+
+void RangeImageSegmentation::find_runs(int row) {
+    const auto width = static_cast<std::size_t>(sensor_.width);
+    const auto first_of = [](const std::uint8_t* begin, std::uint8_t value, std::size_t n) {
+        const void* found = std::memchr(begin, value, n);
+        return found != nullptr ? static_cast<std::size_t>(static_cast<const std::uint8_t*>(found) - begin) : n;
+    };
+    for (std::size_t c = 0; c < width; ++c) {
+        c += first_of(&used_[c], 1, width - c);
+        if (c == width) return;
+        const std::size_t last = std::min(c + first_of(&right_[c], 0, width - c), width - 1);
+        runs_.push_back({static_cast<std::uint32_t>(runs_.size()), 0, static_cast<std::uint16_t>(row),
+                         static_cast<std::uint16_t>(c), static_cast<std::uint16_t>(last)});
+        c = last;
+    }
+}
+
+void RangeImageSegmentation::unite_rows(std::uint32_t above, std::uint32_t here, std::uint32_t end) {
+    const std::uint32_t above_end = here;
+    while (above < above_end && here < end) {
+        const Run& a = runs_[above];
+        const Run& b = runs_[here];
+        const std::uint16_t first = std::max(a.first, b.first);
+        const std::uint16_t last = std::min(a.last, b.last);
+        if (first <= last && std::memchr(&down_[first], 1, static_cast<std::size_t>(last - first) + 1) != nullptr) {
+            unite(above, here);
+        }
+        if (runs_[above].last < runs_[here].last) {
+            ++above;
+        } else {
+            ++here;
+        }
     }
 }
 
@@ -126,8 +161,6 @@ void RangeImageSegmentation::collect(Preparation& prepared, const StructuredClou
         Segment& segment = prepared.segments.emplace_back();
         segment.first = pixels;
         segment.count = points_[i];
-        segment.min_m.setConstant(1e9F);
-        segment.max_m.setConstant(-1e9F);
         runs_[i].segment = static_cast<std::uint32_t>(prepared.segments.size());
         next_pixel_.push_back(pixels);
         pixels += points_[i];
@@ -135,6 +168,7 @@ void RangeImageSegmentation::collect(Preparation& prepared, const StructuredClou
     prepared.pixels.resize(pixels);
     // Runs come in row order: a segment's row is new where it differs from its last one.
     last_row_.assign(prepared.segments.size(), ~0U);
+    bounds_.assign(prepared.segments.size(), {});
     for (const Run& run : runs_) {
         const std::uint32_t label = runs_[run.parent].segment;
         if (label == 0) continue;
@@ -145,17 +179,25 @@ void RangeImageSegmentation::collect(Preparation& prepared, const StructuredClou
         }
         const std::size_t begin = static_cast<std::size_t>(run.row) * static_cast<std::size_t>(sensor_.width);
         std::uint32_t next = next_pixel_[label - 1];
-        for (std::size_t p = begin + run.first; p <= begin + run.last; ++p) {
+        const std::size_t end = begin + run.last + 1;
+        for (std::size_t p = begin + run.first; p < end; ++p) {
             prepared.segment[p] = label;
             prepared.pixels[next++] = static_cast<PixelIndex>(p);
-            const Eigen::Vector3f point(cloud.x[p], cloud.y[p], cloud.z[p]);
-            segment.min_m = segment.min_m.cwiseMin(point);
-            segment.max_m = segment.max_m.cwiseMax(point);
-            segment.max_range_m = std::max(segment.max_range_m, cloud.range_m[p]);
         }
+        // Bounds from both ends of the run and every few pixels between: the cost counts, the millimetres do not.
+        Bounds& bounds = bounds_[label - 1];
+        for (std::size_t p = begin + run.first; p < end; p += kBoundsStep) bounds.include(cloud, p);
+        bounds.include(cloud, end - 1);
         next_pixel_[label - 1] = next;
     }
-    for (Segment& segment : prepared.segments) segment.feasible = is_feasible(segment, config_.feasibility);
+    for (std::size_t i = 0; i < prepared.segments.size(); ++i) {
+        Segment& segment = prepared.segments[i];
+        const Bounds& bounds = bounds_[i];
+        segment.min_m = {bounds.low[0], bounds.low[1], bounds.low[2]};
+        segment.max_m = {bounds.high[0], bounds.high[1], bounds.high[2]};
+        segment.max_range_m = bounds.range;
+        segment.feasible = is_feasible(segment, config_.feasibility);
+    }
 }
 
 void RangeImageSegmentation::process(Frame& frame) {

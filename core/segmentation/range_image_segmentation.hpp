@@ -51,22 +51,34 @@ class RangeImageSegmentation {
         std::uint16_t row, first, last;
     };
 
+    /// Of a segment.
+    struct Bounds {
+        float low[3] = {1e9F, 1e9F, 1e9F};
+        float high[3] = {-1e9F, -1e9F, -1e9F};
+        float range = 0.0F;
+        void include(const StructuredCloud& cloud, std::size_t pixel);
+    };
+
     std::uint32_t find(std::uint32_t run);
     void unite(std::uint32_t a, std::uint32_t b);
     void connect(const Frame& frame);
+    void find_runs(int row);
+    /// Unites the runs of a row, [here, end), with those of the row above, [above, here).
+    void unite_rows(std::uint32_t above, std::uint32_t here, std::uint32_t end);
     void collect(Preparation& prepared, const StructuredCloud& cloud);
 
     SensorModel sensor_;
     SegmentationConfig config_;
-    float ratio_right_ = 0.0F;                           ///< largest ratio of ranges of connected horizontal neighbours
-    AlignedVector<float> ratio_down_;                    ///< [H - 1] likewise of row r and r + 1
-    Image<float> range_;                                 ///< of the pixels that are segmented, 0 elsewhere
-    AlignedVector<std::uint8_t> right_;                  ///< [W] 1: connected to the right neighbour (wrapped)
-    AlignedVector<std::uint8_t> down_;                   ///< [W] 1: the pixel above is connected to this one
-    AlignedVector<std::uint32_t> run_above_, run_here_;  ///< [W] run of the pixel
+    float ratio_right_ = 0.0F;           ///< largest ratio of ranges of connected horizontal neighbours
+    AlignedVector<float> ratio_down_;    ///< [H - 1] likewise of row r and r + 1
+    Image<float> range_;                 ///< of the pixels that are segmented, 0 elsewhere
+    AlignedVector<std::uint8_t> used_;   ///< [W] 1: the pixel is segmented
+    AlignedVector<std::uint8_t> right_;  ///< [W] 1: connected to the right neighbour (wrapped)
+    AlignedVector<std::uint8_t> down_;   ///< [W] 1: the pixel above is connected to this one
     std::vector<Run> runs_;
     std::vector<std::uint32_t> points_;      ///< of the component, by root run
     std::vector<std::uint32_t> next_pixel_;  ///< by segment
+    std::vector<Bounds> bounds_;             ///< by segment
     std::vector<std::uint32_t> last_row_;    ///< by segment
 };
 
