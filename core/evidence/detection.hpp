@@ -17,8 +17,8 @@ struct DetectionConfig {
     bool use_free_space = true;
     double max_range_m = 50.0;
     double occlusion_step_m = 0.3;
-    int samples = 150;
-    int background_stride = 8;
+    int samples = 80;
+    int background_stride = 12;
     double mixed_share = 0.25;
     double compact_m = 1.2;
     FreeSpaceConfig free_space;

@@ -18,8 +18,8 @@ Evidence judge(float free, float occupied) {
 
 EvidenceImage::EvidenceImage(const SensorModel& sensor, const FreeSpaceConfig& config)
     : width_(sensor.width),
-      free_space_(sensor, config),
       references_(sensor, config.octaves),
+      free_space_(sensor, config, references_.narrow_bits(), references_.wide_bits()),
       image_(sensor.height, sensor.width, 0) {
     requested_.reserve(sensor.pixels());
     points_.block_end.assign(Reference::kBlocks, 0);

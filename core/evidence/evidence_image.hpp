@@ -36,8 +36,8 @@ class EvidenceImage {
     void sort_into_blocks(const OdometryResult& odometry);
 
     int width_;
-    FreeSpace free_space_;
     ReferenceImages references_;
+    FreeSpace free_space_;
     std::vector<const Reference*> selected_;
     Image<std::uint8_t> image_;
     std::vector<PixelIndex> requested_;

@@ -48,17 +48,27 @@ struct CandidatePoints {
 /// Compares points with references.
 class FreeSpace {
   public:
-    FreeSpace(const SensorModel& sensor, const FreeSpaceConfig& config);
+    /// @param narrow_bits, wide_bits as of ReferenceImages
+    FreeSpace(const SensorModel& sensor, const FreeSpaceConfig& config, int narrow_bits, int wide_bits);
 
     /// Fills points.free and points.occupied: what the references saw at each point.
     void test(const Frame& frame, std::span<const Reference* const> references, CandidatePoints& points);
 
   private:
+    void test_block(const Reference& reference, const Eigen::Isometry3f& T_reference_sensor, float weight, int begin,
+                    int n, CandidatePoints& points);
+    std::size_t block_of(const Eigen::Vector3f& point) const;
+    void compare_with(const Reference& reference, float weight, int begin, int n, CandidatePoints& points) const;
+
     FreeSpaceConfig config_;
     SensorProjection projection_;
+    Eigen::Isometry3f T_lidar_sensor_;
+    int narrow_bits_;
+    int wide_bits_;
+    float mean_offset_rad_ = 0.0F;      ///< azimuth at which the mean row's column 0 looks, lidar frame
     AlignedVector<std::uint8_t> late_;  ///< [H * W] 1: fired in the second half of the sweep
     int max_shift_ = 0;
-    AlignedVector<std::int32_t> pixel_;
+    AlignedVector<std::int32_t> pixel_;  ///< scratch of one block
     AlignedVector<float> range_;
 };
 

@@ -9,11 +9,11 @@
 namespace dlod {
 namespace {
 
-constexpr int kFarRows = 1;
-constexpr int kNearRows = 2;
-constexpr double kFarWindow_rad = 0.0061;  // half width: one column of 1024
-constexpr int kNearFactor = 3;             // the window of near points is so many times as wide
-constexpr std::uint16_t kNone = 65535;     // a missing return in a minimum
+constexpr int kNarrowRows = 1;  // rows of a window above and below its cell
+constexpr int kWideRows = 2;
+constexpr double kNarrowCell_rad = 0.0062;  // one column of 1024: the window covers three
+constexpr int kWiderBits = 2;               // wide cells have so many bits more
+constexpr std::uint16_t kNone = 65535;      // a missing return in a minimum
 
 DLOD_MULTIVERSION void quantize(int n, const float* __restrict range_m, std::uint16_t* __restrict units) {
     for (int i = 0; i < n; ++i) {
@@ -53,12 +53,13 @@ DLOD_MULTIVERSION void widen(int n, const std::uint16_t* __restrict column_low,
     }
 }
 
-DLOD_MULTIVERSION void pack(int n, int most_missing, const std::uint16_t* __restrict low,
+/// One cell of every `cell`-th window.
+DLOD_MULTIVERSION void pack(int n, int cell, int most_missing, const std::uint16_t* __restrict low,
                             const std::uint16_t* __restrict high, const std::uint16_t* __restrict missing,
-                            std::uint32_t* __restrict window) {
+                            std::uint32_t* __restrict cells) {
     for (int i = 0; i < n; ++i) {
-        const std::uint32_t packed = (static_cast<std::uint32_t>(high[i]) << 16U) | low[i];
-        window[i] = missing[i] <= most_missing ? packed : 0U;
+        const std::uint32_t packed = (static_cast<std::uint32_t>(high[i * cell]) << 16U) | low[i * cell];
+        cells[i] = missing[i * cell] <= most_missing ? packed : 0U;
     }
 }
 
@@ -67,23 +68,25 @@ DLOD_MULTIVERSION void pack(int n, int most_missing, const std::uint16_t* __rest
 ReferenceImages::ReferenceImages(const SensorModel& sensor, int levels)
     : sensor_(sensor),
       levels_(levels),
-      far_columns_(
-          std::max(1, static_cast<int>(std::lround(kFarWindow_rad * sensor.width / (2.0 * std::numbers::pi))))),
-      near_columns_(kNearFactor * far_columns_),
       pool_(2 * static_cast<std::size_t>(levels) + 1),
       users_(pool_.size(), 0),
       slots_(2 * static_cast<std::size_t>(levels), -1),
       units_(sensor.height, sensor.width) {
+    const double column_rad = 2.0 * std::numbers::pi / sensor.width;
+    while (sensor.width % (2 << narrow_bits_) == 0 && (2 << narrow_bits_) * column_rad < 1.5 * kNarrowCell_rad)
+        ++narrow_bits_;
+    wide_bits_ = narrow_bits_;
+    for (int i = 0; i < kWiderBits && sensor.width % (2 << wide_bits_) == 0; ++i) ++wide_bits_;
     double sum = 0.0;
     for (const int shift : sensor.pixel_shift) sum += shift;
     mean_shift_ = sum / std::max(1, sensor.height);
     for (Reference& reference : pool_) {
-        reference.window.assign(2 * sensor.pixels(), 0);
+        reference.cells.assign((sensor.pixels() >> narrow_bits_) + (sensor.pixels() >> wide_bits_), 0);
         reference.T_block_stamp.assign(Reference::kBlocks, Eigen::Isometry3f::Identity());
         reference.T_block_stamp_late.assign(Reference::kBlocks, Eigen::Isometry3f::Identity());
         reference.column_shift.assign(1 + static_cast<std::size_t>(sensor.height), 0.0F);
     }
-    const auto bordered = static_cast<std::size_t>(sensor.width + 2 * near_columns_);
+    const auto bordered = static_cast<std::size_t>(sensor.width + (4 << wide_bits_));
     low_.assign(bordered, 0);
     high_.assign(bordered, 0);
     missing_.assign(bordered, 0);
@@ -159,33 +162,36 @@ void ReferenceImages::fill_windows(const StructuredCloud& cloud, Reference& refe
     const int width = sensor_.width;
     const int height = sensor_.height;
     quantize(static_cast<int>(units_.size()), cloud.range_m.data(), units_.data());
-    const auto fill = [&](int half_rows, int half_columns, std::uint32_t* window) {
-        const int most_missing = (2 * half_rows + 1) * (2 * half_columns + 1) / 3;
-        std::uint16_t* low = low_.data() + half_columns;
-        std::uint16_t* high = high_.data() + half_columns;
-        std::uint16_t* missing = missing_.data() + half_columns;
+    const auto fill = [&](int half_rows, int bits, std::uint32_t* cells) {
+        const int cell = 1 << bits;
+        const int border = std::max(1, cell / 2);
+        const int most_missing = (2 * half_rows + 1) * (cell + 2 * border) / 3;
+        std::uint16_t* low = low_.data() + border;
+        std::uint16_t* high = high_.data() + border;
+        std::uint16_t* missing = missing_.data() + border;
         for (int r = 0; r < height; ++r) {
             const int top = std::max(0, r - half_rows);
             const int bottom = std::min(height - 1, r + half_rows);
             start_column(width, units_.row(top), low, high, missing);
             for (int k = top + 1; k <= bottom; ++k) extend_column(width, units_.row(k), low, high, missing);
             for (auto* v : {low, high, missing}) {
-                std::copy_n(v, half_columns, v + width);
-                std::copy_n(v + width - half_columns, half_columns, v - half_columns);
+                std::copy_n(v, border, v + width);
+                std::copy_n(v + width - border, border, v - border);
             }
-            std::copy_n(low - half_columns, width, window_low_.data());
-            std::copy_n(high - half_columns, width, window_high_.data());
-            std::copy_n(missing - half_columns, width, window_missing_.data());
-            for (int k = 1 - half_columns; k <= half_columns; ++k) {
+            std::copy_n(low - border, width, window_low_.data());
+            std::copy_n(high - border, width, window_high_.data());
+            std::copy_n(missing - border, width, window_missing_.data());
+            for (int k = 1 - border; k < cell + border; ++k) {
                 widen(width, low + k, high + k, missing + k, window_low_.data(), window_high_.data(),
                       window_missing_.data());
             }
-            pack(width, most_missing, window_low_.data(), window_high_.data(), window_missing_.data(),
-                 window + static_cast<std::size_t>(r) * static_cast<std::size_t>(width));
+            pack(width >> bits, cell, most_missing, window_low_.data(), window_high_.data(), window_missing_.data(),
+                 cells);
+            cells += width >> bits;
         }
     };
-    fill(kFarRows, far_columns_, reference.window.data());
-    fill(kNearRows, near_columns_, reference.window.data() + sensor_.pixels());
+    fill(kNarrowRows, narrow_bits_, reference.cells.data());
+    fill(kWideRows, wide_bits_, reference.cells.data() + (sensor_.pixels() >> narrow_bits_));
 }
 
 }  // namespace dlod

@@ -21,9 +21,11 @@ struct Reference {
     std::vector<Eigen::Isometry3f>
         T_block_stamp_late;  ///< likewise where the block lies at the image's seam and was fired at the sweep's end
     AlignedVector<float> column_shift;  ///< [H] columns by which yaw within a block moves each row (pixel shift)
-    /// Nearest return of the pixel's window (low 16 bits) and farthest (high 16 bits), in units; 0 where too many of
-    /// the window's pixels have no return. Two images one after the other: for far and for near points.
-    AlignedVector<std::uint32_t> window;
+    /// Nearest return of a cell's window (low 16 bits) and farthest (high 16 bits), in units; 0 where too many of the
+    /// window's pixels have no return. A cell is a few columns of one row, its window reaches half a cell further on
+    /// both sides and some rows up and down. First the narrow cells, for far points, then
+    /// the wide ones, for near points.
+    AlignedVector<std::uint32_t> cells;
     std::int64_t stamp_ns = 0;
     std::uint64_t number = 0;  ///< counts references from 0
 };
@@ -42,8 +44,9 @@ class ReferenceImages {
     /// References for the next frame, newest first, none twice.
     const std::vector<const Reference*>& select();
 
-    /// Half widths of the windows, columns and rows.
-    int far_columns() const { return far_columns_; }
+    /// Pixels a cell, a power of two: cell = pixel index >> bits.
+    int narrow_bits() const { return narrow_bits_; }
+    int wide_bits() const { return wide_bits_; }
 
   private:
     void fill_windows(const StructuredCloud& cloud, Reference& reference);
@@ -51,17 +54,18 @@ class ReferenceImages {
 
     SensorModel sensor_;
     int levels_;
-    int far_columns_;
-    int near_columns_;
+    int narrow_bits_ = 0;
+    int wide_bits_ = 0;
     double mean_shift_;
     std::uint64_t inserted_ = 0;
     std::vector<Reference> pool_;
     std::vector<int> users_;  ///< [pool] number of slots that hold it
     std::vector<int> slots_;  ///< [2 * levels] pool index of the two latest multiples of 2^level, -1 none
     std::vector<const Reference*> selected_;
-    Image<std::uint16_t> units_;                         ///< ranges of the frame being inserted
-    AlignedVector<std::uint16_t> low_, high_, missing_;  ///< [W + borders] of the pixels above each other, wrapped
-    AlignedVector<std::uint16_t> window_low_, window_high_, window_missing_;  ///< [W] of a row's windows
+    Image<std::uint16_t> units_;  ///< ranges of the frame being inserted
+    AlignedVector<std::uint16_t> low_, high_,
+        missing_;  ///< [W + borders] extremes of the pixels above each other, wrapped
+    AlignedVector<std::uint16_t> window_low_, window_high_, window_missing_;  ///< [W] likewise over a row's windows
 };
 
 }  // namespace dlod
