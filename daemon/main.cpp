@@ -76,6 +76,10 @@ int main(int argc, char** argv) {
                      "0: as fast as possible (default), 1: true rate, 2: twice as fast, ...")
         ->check(CLI::Range(0.0, 1000.0));
 
+    ConfigSources doctored;
+    auto* doctor_command = app.add_subcommand("doctor", "check this machine and say how to mend what is wrong");
+    add_config_options(*doctor_command, doctored);
+
     std::filesystem::path info_file;
     std::optional<std::filesystem::path> info_metadata;
     auto* info_command = app.add_subcommand("info", "describe a capture or a metadata file");
@@ -105,6 +109,7 @@ int main(int argc, char** argv) {
         ExitCode code = ExitCode::kSuccess;
         if (*run_command) code = run(run_arguments);
         if (*replay_command) code = replay(replay_arguments);
+        if (*doctor_command) code = doctor(doctored);
         if (*info_command) code = info(info_file, info_metadata);
         if (*check_command) code = check_config(checked, checked_metadata);
         if (*print_command) code = print_config(printed, printed_metadata);

@@ -30,6 +30,8 @@ struct RunArguments {
 
 ExitCode replay(const ReplayArguments& arguments);
 ExitCode run(const RunArguments& arguments);
+/// Checks the machine for what the configuration needs; fails where dlod could not do its job.
+ExitCode doctor(const ConfigSources& config);
 /// Sensor, profile, packets, frames, losses and duration of a capture; of a metadata file the sensor alone.
 ExitCode info(const std::filesystem::path& file, const std::optional<std::filesystem::path>& metadata);
 ExitCode check_config(const ConfigSources& config, const std::optional<std::filesystem::path>& metadata);

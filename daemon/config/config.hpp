@@ -11,9 +11,26 @@
 
 namespace dlod::daemon {
 
+/// What to set on the sensor itself; empty: left as it is.
+struct ConfigureSensorConfig {
+    std::string udp_dest;
+    std::string lidar_mode;
+    std::string lidar_profile;
+    std::string timestamp_mode;
+
+    template <class V>
+    void visit(V& v) {
+        v.text("udp_dest", udp_dest, "address to which the sensor sends; @auto: this host");
+        v.text("lidar_mode", lidar_mode, "columns and rate, say 1024x10");
+        v.text("lidar_profile", lidar_profile, "packet profile, say RNG15_RFL8_NIR8");
+        v.text("timestamp_mode", timestamp_mode, "the sensor's clock, say TIME_FROM_PTP_1588");
+    }
+};
+
 /// Where packets come from and how their sender is known.
 struct SensorConfig {
     std::string metadata;
+    std::string host;
     std::string bind_address;
     std::string multicast_group;
     std::string interface;
@@ -23,11 +40,14 @@ struct SensorConfig {
     bool share_ports = false;
     std::string forward_to;
     int receive_buffer_bytes = 16'000'000;
+    ConfigureSensorConfig configure;
 
     template <class V>
     void visit(V& v) {
         v.text("metadata", metadata,
                "file with the sensor's metadata (JSON); replay takes the capture's name with .json when empty");
+        v.text("host", host,
+               "name or address of the sensor: a live run without metadata file asks it for its metadata over HTTP");
         v.parameter("lidar_port", lidar_port, Range{0, 65535}, "port",
                     "UDP port of lidar packets; 0: as the metadata says");
         v.parameter("imu_port", imu_port, Range{0, 65535}, "port", "UDP port of IMU packets; 0: as the metadata says");
@@ -41,6 +61,7 @@ struct SensorConfig {
                "address or address:port to which every packet taken is sent on; empty: nowhere");
         v.parameter("receive_buffer_bytes", receive_buffer_bytes, Range{65'536, 1'000'000'000}, "byte",
                     "socket receive buffer to ask for; net.core.rmem_max bounds what the kernel grants");
+        v.group("configure", configure, "set on the sensor at the start, which restarts its stream; needs sensor.host");
     }
 };
 

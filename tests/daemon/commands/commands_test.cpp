@@ -72,13 +72,20 @@ TEST_F(CommandsTest, ReplayWritesTheFolderAndASummary) {
 
 TEST_F(CommandsTest, HelpAndVersion) {
     EXPECT_TRUE(ends(dlod({"--version"}), 0, {"dlod "}));
-    EXPECT_TRUE(ends(dlod({"--help"}), 0, {"replay", "run", "info", "check-config", "print-config", "Exit codes"}));
-    for (const char* command : {"run", "replay", "info", "check-config", "print-config"}) {
+    EXPECT_TRUE(
+        ends(dlod({"--help"}), 0, {"replay", "run", "info", "doctor", "check-config", "print-config", "Exit codes"}));
+    for (const char* command : {"run", "replay", "info", "doctor", "check-config", "print-config"}) {
         EXPECT_TRUE(ends(dlod({command, "--help"}), 0, {"Exit codes"})) << command;
     }
     EXPECT_TRUE(ends(dlod({}), 2, {}));
     EXPECT_TRUE(ends(dlod({"replay"}), 2, {"PCAP"}));
     EXPECT_TRUE(ends(dlod({"fly"}), 2, {}));
+}
+
+TEST_F(CommandsTest, DoctorNamesRemedies) {
+    const auto outcome = dlod({"doctor", "--set", "sensor.receive_buffer_bytes=1000000000", "--set", "lcm.url=none"});
+    EXPECT_TRUE(outcome.exit_code == 0 || outcome.exit_code == 1) << outcome.exit_code;
+    EXPECT_TRUE(ends(outcome, outcome.exit_code, {"receive buffer", "net.core.rmem_max=1000000000", "clock"}));
 }
 
 TEST_F(CommandsTest, Info) {

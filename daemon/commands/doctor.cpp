@@ -1,0 +1,49 @@
+#include <algorithm>
+#include <cstdio>
+#include <vector>
+
+#include "daemon/commands/commands.hpp"
+#include "daemon/commands/load_config.hpp"
+#include "daemon/doctor/checks.hpp"
+
+namespace dlod::daemon {
+namespace {
+
+/// What LCM takes an empty URL for.
+constexpr const char* kDefaultLcmUrl = "udpm://239.255.76.67:7667?ttl=0";
+
+const char* word_for(Check::Verdict verdict) {
+    switch (verdict) {
+        case Check::Verdict::kGood:
+            return "good";
+        case Check::Verdict::kWarning:
+            return "warning";
+        case Check::Verdict::kFailure:
+            break;
+    }
+    return "FAILURE";
+}
+
+}  // namespace
+
+ExitCode doctor(const ConfigSources& sources) {
+    const Config config = load_config(sources, nullptr);
+    std::vector<Check> checks = {check_receive_buffer(config.sensor.receive_buffer_bytes),
+                                 check_realtime_priority(config.pipeline.realtime_priority),
+                                 check_locked_memory(config.pipeline.lock_memory), check_clock_synchronised(),
+                                 check_sensor(config.sensor.host)};
+    if (config.lcm.url.empty()) checks.push_back(check_multicast(kDefaultLcmUrl));
+    if (!config.lcm.url.empty() && config.lcm.url != "none") checks.push_back(check_multicast(config.lcm.url));
+    // Room for an hour of results at 128 x 1024 and 10 Hz.
+    constexpr std::uint64_t kResultBytes = 25'000'000'000;
+    if (!config.output.folder.empty()) checks.push_back(check_disk(config.output.folder, kResultBytes));
+    for (const Check& check : checks) {
+        std::printf("%-8s %s: %s\n", word_for(check.verdict), check.name.c_str(), check.finding.c_str());
+        if (!check.remedy.empty()) std::printf("         -> %s\n", check.remedy.c_str());
+    }
+    const bool failed = std::any_of(checks.begin(), checks.end(),
+                                    [](const Check& check) { return check.verdict == Check::Verdict::kFailure; });
+    return failed ? ExitCode::kFailure : ExitCode::kSuccess;
+}
+
+}  // namespace dlod::daemon

@@ -1,0 +1,65 @@
+// One run on a live sensor: everything between its packets and the messages, and the reports on it.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "daemon/clock/host_time_filter.hpp"
+#include "daemon/config/config.hpp"
+#include "daemon/output/result_writer.hpp"
+#include "daemon/pipeline/pipeline.hpp"
+#include "daemon/publish/frame_publisher.hpp"
+#include "daemon/publish/lcm_bus.hpp"
+#include "daemon/recorder/recording_source.hpp"
+#include "daemon/service/log.hpp"
+#include "daemon/service/notifier.hpp"
+#include "daemon/status/status_board.hpp"
+#include "driver/udp_source.hpp"
+
+namespace dlod::daemon {
+
+class LiveSession {
+  public:
+    /// Opens sockets, LCM and files. @param metadata as the sensor gave it, for the recording
+    /// @throws driver::SourceError, MessageBusError, OutputError
+    LiveSession(const Config& config, const driver::SensorInfo& sensor, const std::string& metadata);
+
+    void start();
+    /// Ends the reception; what was received is still processed.
+    void stop() { pipeline_.stop(); }
+    bool done() const { return pipeline_.done(); }
+    int done_descriptor() const { return pipeline_.done_descriptor(); }
+    /// Once a second: status message, systemd's status line and watchdog, log where the health changes.
+    void report();
+    /// After done(): rethrows what has failed, writes what is written at the end.
+    void finish();
+    std::string one_line() const { return board_.one_line(); }
+
+  private:
+    driver::PacketSource& source() { return recording_ ? static_cast<driver::PacketSource&>(*recording_) : socket_; }
+    FrameSinks sinks();
+    void publish(const PipelineFrame& frame);
+    void write(PipelineFrame& frame);
+    CounterList counters();
+    void report_clock_step();
+    void log_health(const status_t& status);
+
+    Config config_;
+    std::string description_;
+    driver::UdpSource socket_;
+    std::unique_ptr<RecordingSource> recording_;
+    std::unique_ptr<LcmBus> bus_;
+    std::unique_ptr<FramePublisher> publisher_;
+    std::unique_ptr<MessageSender> status_sender_;
+    std::unique_ptr<ResultWriter> writer_;
+    HostTimeFilter host_time_;
+    StatusBoard board_;
+    RepeatedWarnings warnings_;
+    ServiceNotifier service_;
+    driver::Counter output_failures_;
+    std::int8_t last_health_ = status_t::WAITING;
+    Pipeline pipeline_;  // last: its threads use all of the above
+};
+
+}  // namespace dlod::daemon
