@@ -34,7 +34,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         fragment.more_fragments = (flags & 1U) != 0;
         fragment.offset = (input.u16() & 0x1FFFU) * 8U;
         if ((flags & 2U) != 0) fragment.offset %= 64;  // close together more often than not
-        const std::size_t length = (flags & 4U) != 0 ? input.u16() : input.u8() % 8 * 8U;
+        const std::size_t length = (flags & 4U) != 0 ? input.u16() % 2048U : input.u8() % 8 * 8U;
         const unsigned variant = flags >> 3U & 1U;
         time_ns += static_cast<std::int64_t>(flags >> 4U) * 50'000'000;
         if ((flags & 0xF0U) == 0xF0U) time_ns -= 2'000'000'000;
