@@ -23,17 +23,19 @@ ArcPath::ArcPath(const std::vector<Vec2>& corners, bool closed, double corner_m)
         std::vector<Eigen::Vector2d> wrapped;
         for (int i = -3; i < count + 3; ++i) wrapped.push_back(knots[static_cast<std::size_t>((i + count) % count)]);
         knots = std::move(wrapped);
-    } else {
+    } else {  // mirrored at its ends, so that the spline passes through them
         knots.push_back(corners.back());
+        const std::size_t n = knots.size();
+        knots.emplace_back(2.0 * knots[n - 1] - knots[n - 2]);
+        knots.insert(knots.begin(), 2.0 * knots[0] - knots[1]);
     }
-    const Spline<2> spline(closed ? -3.0 : 0.0, 1.0, knots);
-    const double end = closed ? count : static_cast<double>(knots.size()) - 1.0;
+    const Spline<2> spline(closed ? -3.0 : -1.0, 1.0, knots);
 
     // Finely along the spline's own parameter, then evenly along its length.
     constexpr int kFine = 50;
     std::vector<double> length{0.0};
     std::vector<Vec2> points{spline(0.0)};
-    const int fine = static_cast<int>(end) * kFine;
+    const int fine = count * kFine;
     for (int i = 1; i <= fine; ++i) {
         points.emplace_back(spline(static_cast<double>(i) / kFine));
         length.push_back(length.back() + (points.back() - points[points.size() - 2]).norm());

@@ -1,4 +1,5 @@
 // Corridors around a core, rooms on both sides with doorways and furniture, doors that open, people who pass.
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -52,6 +53,8 @@ class Building {
     }
 
     const std::vector<Doorway>& doorways() const { return doorways_; }
+    /// Middles of all doors, also of those that are closed.
+    const std::vector<Vec2>& doors() const { return doors_; }
 
   private:
     void add_room(const Vec2& from, const Vec2& to, const Vec2& out, double depth_m) {
@@ -64,8 +67,13 @@ class Building {
         add_wall(b_, from, left, 0.0, kHeight);
         add_wall(b_, right, to, 0.0, kHeight);
         add_wall(b_, left, right, kDoorHeight, kHeight);
-        const double along = std::atan2(d.y(), d.x());
         const Vec2 middle = 0.5 * (left + right);
+        const double along = std::atan2(d.y(), d.x());
+        doors_.push_back(middle);
+        for (const Vec2& jamb : {left, right}) {
+            b_.mesh().add_box(Vec3(jamb.x(), jamb.y(), 0.5 * kDoorHeight), Vec3(0.08, kWall + 0.06, kDoorHeight), along,
+                              Material::kMetal);
+        }
         const double kind = random.uniform();
         if (kind < 0.2) {  // closed for good
             const Vec2 leaf = middle + out * 0.05;
@@ -127,24 +135,33 @@ class Building {
 
     SceneBuilder& b_;
     std::vector<Doorway> doorways_;
+    std::vector<Vec2> doors_;
 };
 
 /// What stands along the corridors' walls.
-void add_corridor_furniture(SceneBuilder& b) {
+void add_corridor_furniture(SceneBuilder& b, const std::vector<Vec2>& doors) {
     Random& random = b.random();
-    for (int i = 0; i < 10; ++i) {
+    for (int i = 0; i < 24; ++i) {
         const bool lengthwise = i % 2 == 0;
         const double side = random.sign();
         const double off = random.sign() * (kHalfCorridor - 0.35);
         const Vec2 p = lengthwise ? Vec2(random.uniform(-16.0, 16.0), side * kRing.y() + off)
                                   : Vec2(side * kRing.x() + off, random.uniform(-7.0, 7.0));
+        const bool blocks_door =
+            std::any_of(doors.begin(), doors.end(), [&](const Vec2& door) { return (door - p).norm() < 1.3; });
+        if (blocks_door) continue;
         const Vec3 base(p.x(), p.y(), 0.0);
         const double yaw = (lengthwise ? 0.5 : 0.0) * std::numbers::pi;
-        switch (random.integer(0, 2)) {
+        switch (random.integer(0, 3)) {
             case 0:
                 add_cabinet(b.stage(), base, yaw);
                 break;
-            case 1:
+            case 1:  // a pillar of the wall
+                b.mesh().add_box(base + Vec3(0.0, 0.0, 0.5 * kHeight), Vec3(0.4, 0.5, kHeight), yaw,
+                                 Material::kConcrete);
+                b.obstacles().push_back(Obstacle::box(p, Vec2(0.4, 0.5), yaw));
+                break;
+            case 2:
                 add_plant(b.stage(), base);
                 break;
             default:
@@ -215,7 +232,12 @@ World build_corridor(const SceneOptions& options) {
     building.add_rooms(ring(-o, -1, 1), ring(-o, 1, 1), 4.5);
     add_wall(b, ring(-o, 1, -1), ring(-o, 1, 1), 0.0, kHeight);
     add_wall(b, ring(-o, -1, -1), ring(-o, -1, 1), 0.0, kHeight);
-    add_corridor_furniture(b);
+    add_corridor_furniture(b, building.doors());
+    for (double x = -18.0; x <= 18.0; x += 4.0) {  // lamps
+        for (const double y : {-kRing.y(), kRing.y()}) {
+            b.mesh().add_box(Vec3(x, y, kHeight - 0.04), Vec3(1.2, 0.25, 0.08), 0.0, Material::kPlastic);
+        }
+    }
     add_people(b, building.doorways());
     return b.finish();
 }
