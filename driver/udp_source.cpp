@@ -92,6 +92,7 @@ UdpSource::UdpSource(UdpOptions options) : options_(std::move(options)) {
     buffers_.resize(batch);
     addresses_.resize(batch);
     packets_.resize(batch);
+    merged_.resize(batch);
     for (std::size_t i = 0; i < batch; ++i) {
         buffers_[i] = {memory_.get() + i * largest, largest};
         messages_[i] = {};
@@ -289,29 +290,41 @@ PacketBatch UdpSource::next() {
     // Every ready socket gets its share of the batch, the last one what is left.
     auto waiting = static_cast<std::size_t>(std::count_if(polled.begin(), polled.begin() + sockets_.size(),
                                                           [](const pollfd& p) { return p.revents != 0; }));
-    const bool several = waiting > 1;
     std::size_t used = 0;
-    std::size_t count = 0;
     for (std::size_t i = 0; i < sockets_.size(); ++i) {
+        Socket& s = sockets_[i];
+        s.received = {};
         if (polled[i].revents == 0) continue;
         const std::size_t share = (messages_.size() - used) / waiting--;
-        const std::size_t received = receive(sockets_[i], used, share);
-        for (std::size_t m = used; m < used + received; ++m) {
-            if (take_message(sockets_[i], messages_[m], packets_[count])) ++count;
+        const std::size_t messages = receive(s, used, share);
+        std::size_t count = 0;
+        for (std::size_t m = used; m < used + messages; ++m) {
+            if (take_message(s, messages_[m], packets_[used + count])) ++count;
         }
-        used += received;
+        s.received = std::span(packets_).subspan(used, count);
+        used += messages;
     }
-    if (count == 0) return {.status = SourceStatus::kIdle, .packets = {}};
-    const std::span<Packet> packets(packets_.data(), count);
-    if (several) {
-        std::sort(packets.begin(), packets.end(), [](const Packet& x, const Packet& y) {
-            // Of equal stamps the one received first, which is first in memory.
-            return std::pair(x.receive_ns, x.data.data()) < std::pair(y.receive_ns, y.data.data());
-        });
-    }
-    counters_.delivered.add(count);
+    const std::span<const Packet> packets = merge_received();
+    if (packets.empty()) return {.status = SourceStatus::kIdle, .packets = {}};
+    counters_.delivered.add(packets.size());
     if (forwarder_) forwarder_->send(packets);
     return {.status = SourceStatus::kPackets, .packets = packets};
+}
+
+std::span<const Packet> UdpSource::merge_received() {
+    // By stamps between the sockets, but never against the order of one socket: a clock that is set back, or stamps
+    // that the kernel makes up late for what came before it had begun to stamp, must not reorder a sensor's packets.
+    std::size_t count = 0;
+    for (;;) {
+        Socket* first = nullptr;
+        for (Socket& s : sockets_) {
+            if (s.received.empty()) continue;
+            if (first == nullptr || s.received[0].receive_ns < first->received[0].receive_ns) first = &s;
+        }
+        if (first == nullptr) return std::span(merged_).first(count);
+        merged_[count++] = first->received[0];
+        first->received = first->received.subspan(1);
+    }
 }
 
 std::size_t UdpSource::receive(Socket& s, std::size_t first, std::size_t room) {

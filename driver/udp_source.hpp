@@ -65,7 +65,8 @@ class UdpSource final : public PacketSource {
     struct Socket {
         int fd = -1;
         std::uint16_t port = 0;
-        std::uint32_t kernel_drops = 0;  ///< the kernel's running count
+        std::uint32_t kernel_drops = 0;    ///< the kernel's running count
+        std::span<const Packet> received;  ///< in this batch, not yet merged
     };
 
     void open_socket(std::uint16_t port);
@@ -74,6 +75,7 @@ class UdpSource final : public PacketSource {
     void open_forwarder();
     std::size_t receive(Socket& s, std::size_t first, std::size_t room);
     bool take_message(Socket& s, const mmsghdr& message, Packet& packet);
+    std::span<const Packet> merge_received();
     void renew_membership();
 
     UdpOptions options_;
@@ -95,7 +97,8 @@ class UdpSource final : public PacketSource {
     std::vector<mmsghdr> messages_;
     std::vector<iovec> buffers_;
     std::vector<sockaddr_storage> addresses_;
-    std::vector<Packet> packets_;
+    std::vector<Packet> packets_;  // socket by socket
+    std::vector<Packet> merged_;   // as handed out
     UdpCounters counters_;
 };
 

@@ -133,6 +133,8 @@ TEST(UdpSource, KeepsOrderAcrossPortsWithinABatch) {
     UdpSource source(local({0, 0}));
     const auto ports = source.ports();
     Sender sender;
+    // The kernel begins to stamp a moment after the first socket asks for it; before, packets are stamped when read.
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
     for (unsigned i = 0; i < 20; ++i) sender.send("127.0.0.1", ports[i % 2], pattern(100, i));
     const auto all = receive(source, 20);
     ASSERT_EQ(all.size(), 20U);
