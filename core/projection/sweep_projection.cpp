@@ -22,14 +22,11 @@ std::optional<SweepProjection::Appearance> SweepProjection::project(const Eigen:
     std::optional<Pixel> pixel = projection_.project(Eigen::Vector3f(at_stamp.x(), at_stamp.y(), 0.0F));
     if (!pixel) pixel = projection_.project(at_stamp);
     if (!pixel) return std::nullopt;
-    Eigen::Vector3f p = at_stamp;
-    // The second round corrects the column by the motion between its time and the stamp.
-    for (int round = 0; round < 2; ++round) {
-        const int measurement = sensor_.measurement_of(pixel->row, pixel->column);
-        p = T_block_stamp_[static_cast<std::size_t>(measurement * kBlocks / sensor_.width)] * at_stamp;
-        pixel = projection_.project(p);
-        if (!pixel) return std::nullopt;
-    }
+    // The motion between the column's time and the stamp: what the column itself moves by it changes nothing more.
+    const int block = sensor_.measurement_of(pixel->row, pixel->column) * kBlocks / sensor_.width;
+    const Eigen::Vector3f p = T_block_stamp_[static_cast<std::size_t>(block)] * at_stamp;
+    pixel = projection_.project(p);
+    if (!pixel) return std::nullopt;
     return Appearance{*pixel, range_of(p)};
 }
 

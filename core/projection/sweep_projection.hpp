@@ -21,7 +21,7 @@ class SweepProjection {
         Pixel pixel;
         float range_m = 0.0F;  ///< from the sensor when the pixel was fired
     };
-    /// The pixel that looked at a point of the world frame; nothing outside of the image.
+    /// The pixel that looked at a point of the world frame, to within one column; nothing outside of the image.
     std::optional<Appearance> project(const Eigen::Vector3d& world_m) const;
 
   private:

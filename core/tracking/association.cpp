@@ -10,16 +10,21 @@ namespace dlod {
 
 namespace {
 
+constexpr double kBeyond = 2.0;      // any gated distance above 1
+constexpr double kMaxSlack_m = 3.0;  // of the boxes of the largest vehicles
+
 /// Position of a track against a detection, in units of the gate: above 1 the pair is out of the question.
 double gated_distance(const ExpectedTrack& track, const CandidateDetection& detection,
                       const AssociationConfig& config) {
     const Eigen::Vector2d offset = (detection.visible.center_m - track.visible.center_m).head<2>();
+    const double farthest = config.max_speed_mps * track.dt_s + kMaxSlack_m;
+    if (offset.squaredNorm() > farthest * farthest) return kBeyond;
     // Visible boxes shift by a part of their size when limbs and sides come and go.
     const double slack =
         0.1 + 0.15 * std::min(track.visible.size_m.head<2>().norm(), detection.visible.size_m.head<2>().norm());
     const double distance = offset.norm();
     const double reach = config.max_speed_mps * track.dt_s + slack;
-    if (distance > reach) return 2.0;
+    if (distance > reach) return kBeyond;
     if (track.young) return distance / reach;
     const Eigen::Vector2d expected = track.filter->box().center_m.head<2>() + offset;
     const double d2 =

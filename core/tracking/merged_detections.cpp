@@ -19,7 +19,8 @@ double area(const OrientedBox& box) {
 }
 
 bool covers(const Detection& detection, const OrientedBox& box) {
-    return footprint_distance_m(detection.box, box.center_m) < kInside_m &&
+    return near_footprint(detection.box, box.center_m, kInside_m) &&
+           footprint_distance_m(detection.box, box.center_m) < kInside_m &&
            std::abs(detection.box.center_m.z() - box.center_m.z()) < 0.5 * (detection.box.size_m.z() + box.size_m.z());
 }
 

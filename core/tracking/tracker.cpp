@@ -140,6 +140,7 @@ void Tracker::State::attach_parts(Frame& frame) {
             if (matched[other] < 0 || matched[other] == own) continue;
             const auto t = static_cast<std::size_t>(matched[other]);
             const TrackedObject& host = objects[t];
+            if (!near_footprint(host.box(), detections[d].centroid_m, kLimbMargin_m)) continue;
             if (!host.steady() || candidates[d].motion * expected[t].motion < -0.2) continue;
             const OrientedBox box = host.box();
             if (height_gap_m(box, detections[d].box) > kMaxGap_m) continue;

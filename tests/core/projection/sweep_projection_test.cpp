@@ -11,7 +11,7 @@ namespace dlod {
 namespace {
 
 /// Fires each pixel from where the sensor is at that time, and asks where the point that it hits appears.
-TEST(SweepProjection, FindsThePixelThatLookedAtAPoint) {
+TEST(SweepProjection, FindsThePixelThatLookedAtAPointToWithinOne) {
     const SensorModel sensor = test::small_sensor();
     Frame frame(sensor);
     OdometryResult& odometry = frame.odometry;
@@ -27,7 +27,7 @@ TEST(SweepProjection, FindsThePixelThatLookedAtAPoint) {
     }
     SweepProjection projection(sensor);
     projection.set(odometry);
-    int exact = 0, near = 0, all = 0;
+    int near = 0, all = 0;
     for (int r = 2; r < sensor.height - 2; r += 3) {
         for (int c = 0; c < sensor.width; c += 5) {
             const double azimuth = 2.0 * 3.14159265358979 * (1.0 - static_cast<double>(c) / sensor.width);
@@ -41,13 +41,11 @@ TEST(SweepProjection, FindsThePixelThatLookedAtAPoint) {
             if (!seen) continue;
             EXPECT_NEAR(seen->range_m, 8.0, 0.02);
             const int dc = std::abs(seen->pixel.column - c);
-            exact += seen->pixel.row == r && dc == 0;
             near += std::abs(seen->pixel.row - r) <= 1 && std::min(dc, sensor.width - dc) <= 1;
         }
     }
     // At the seam a place may be seen twice or not at all.
     EXPECT_GT(near, 0.93 * all);
-    EXPECT_GT(exact, 0.8 * all);
 }
 
 }  // namespace
