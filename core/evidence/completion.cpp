@@ -13,6 +13,7 @@ constexpr double kGroundReach_m = 1.5;
 constexpr std::size_t kFewestGroundPoints = 8;
 constexpr double kOutlier_m = 0.04;  // feet among the ground points
 constexpr double kFootStep_m = 0.2;
+constexpr std::uint32_t kSplinter = 80;  // pixels: segments so small at the edge of an object belong to it
 
 }  // namespace
 
@@ -115,7 +116,9 @@ void Completion::complete(const Frame& frame, const EvidenceImage& evidence, std
         grow(frame, first, config_.fringe_m, pixels, [&](PixelIndex q) {
             if (frame.prepared.ground[q] != 0 || evidence[q] == Evidence::kOccupied) return false;
             const std::uint32_t segment = frame.prepared.segment[q];
-            return segment == 0 || evidence[q] == Evidence::kFree;
+            if (segment == 0 || evidence[q] == Evidence::kFree) return true;
+            const Segment& other = frame.prepared.segments[segment - 1];
+            return !other.feasible && other.count <= kSplinter;
         });
     }
     const GroundPlane plane = fit_ground(frame, std::span(pixels).subspan(first));

@@ -55,7 +55,10 @@ bool Detector::State::is_divided(const Segment& segment, const Counts& c) const 
     constexpr int kFewest = 3;
     if (c.free < kFewest) return false;
     const Eigen::Vector3f size = segment.max_m - segment.min_m;
-    if (segment.feasible && static_cast<double>(std::max(size.x(), size.y())) <= config.compact_m) return false;
+    // A slow or turning object is partly where it was before: one no larger than a person stays whole unless most of it
+    // was there.
+    const bool compact = segment.feasible && static_cast<double>(std::max(size.x(), size.y())) <= config.compact_m;
+    if (compact && 2 * c.occupied <= 5 * c.free) return false;
     return !segment.feasible || (c.occupied >= kFewest && c.occupied > config.mixed_share * (c.free + c.occupied));
 }
 
@@ -66,8 +69,10 @@ void Detector::State::test(const Frame& frame) {
     counts.assign(prepared.segments.size(), {});
     for (const Segment& segment : prepared.segments) {
         const auto samples = static_cast<std::uint32_t>(config.samples);
-        const std::uint32_t stride = segment.feasible ? (segment.count + samples - 1) / samples
-                                                      : static_cast<std::uint32_t>(config.background_stride);
+        // Small leftovers may be far objects or parts of near ones: tested like objects.
+        const bool coarse = !segment.feasible && segment.count > samples;
+        const std::uint32_t stride =
+            coarse ? static_cast<std::uint32_t>(config.background_stride) : (segment.count + samples - 1) / samples;
         for (std::uint32_t i = stride / 2; i < segment.count; i += stride) {
             const PixelIndex pixel = prepared.pixels[segment.first + i];
             if (static_cast<double>(frame.cloud.range_m[pixel]) <= config.max_range_m) evidence.request(pixel);
@@ -127,7 +132,12 @@ void Detector::State::detect(Frame& frame) {
     for (std::size_t s = 0; s < prepared.segments.size(); ++s) {
         const Segment& segment = prepared.segments[s];
         if (config.use_free_space && is_divided(segment, counts[s])) {
-            parts.find(frame, segment, evidence, [&](std::span<const PixelIndex> pixels) { add(frame, pixels); });
+            const auto add_part = [&](std::span<const PixelIndex> pixels) { add(frame, pixels); };
+            // What is left of an object may be the part of it that rests.
+            parts.find(frame, segment, evidence, add_part, [&](std::span<const PixelIndex> pixels) {
+                if (segment.feasible && pixels.size() >= static_cast<std::size_t>(config.parts.min_points))
+                    add(frame, pixels);
+            });
         } else if (segment.feasible && static_cast<double>(segment.max_range_m) <= config.max_range_m) {
             add(frame, std::span(prepared.pixels).subspan(segment.first, segment.count));
         }

@@ -39,7 +39,8 @@ struct DetectionConfig {
             "of segments that are no objects every n-th pixel is tested; higher is faster, finds less at walls");
         v.parameter("mixed_share", mixed_share, Range{0.0, 1.0}, "1",
                     "a segment of which this share of the evidence says occupied, and the rest free, is divided");
-        v.parameter("compact_m", compact_m, Range{0.0, 10.0}, "m", "segments no wider than this are not divided");
+        v.parameter("compact_m", compact_m, Range{0.0, 10.0}, "m",
+                    "segments no wider than this are divided only where most of the evidence says occupied");
         v.group("free_space", free_space, "comparison with earlier frames");
         v.group("parts", parts, "moving parts of segments");
         v.group("completion", completion, "pixels at the edges and feet of objects");

@@ -13,7 +13,7 @@ constexpr int kMaxWindow = 24;  // pixels to each side that are tested around a 
 }  // namespace
 
 MovingParts::MovingParts(const SensorModel& sensor, const MovingPartsConfig& config)
-    : sensor_(sensor), config_(config), taken_(sensor.height, sensor.width, 0) {
+    : sensor_(sensor), config_(config), state_(sensor.height, sensor.width, kFresh) {
     part_.reserve(sensor.pixels());
     away_m_.reserve(sensor.pixels());
 }
@@ -50,7 +50,7 @@ bool MovingParts::grow(const Frame& frame, const Segment& segment, const Evidenc
     away_m_.clear();
     part_.push_back(seed);
     away_m_.push_back(0.0F);
-    taken_[seed] = 1;
+    state_[seed] = kVisited;
     std::size_t free = 0;
     for (std::size_t next = 0; next < part_.size(); ++next) {
         const PixelIndex p = part_[next];
@@ -62,14 +62,15 @@ bool MovingParts::grow(const Frame& frame, const Segment& segment, const Evidenc
         const std::array<PixelIndex, 4> neighbours{p - width, p + width, column == 0 ? p + width - 1 : p - 1,
                                                    column + 1 == width ? p + 1 - width : p + 1};
         for (const PixelIndex q : neighbours) {
-            if (q >= size || taken_[q] != 0 || frame.prepared.segment[q] != label || evidence[q] == Evidence::kOccupied)
+            if (q >= size || state_[q] != kFresh || frame.prepared.segment[q] != label ||
+                evidence[q] == Evidence::kOccupied)
                 continue;
             const float step = Eigen::Vector3f(odometry.x[q] - odometry.x[p], odometry.y[q] - odometry.y[p],
                                                odometry.z[q] - odometry.z[p])
                                    .norm();
             const float away = evidence[q] == Evidence::kFree ? 0.0F : away_m_[next] + step;
             if (away > reach) continue;
-            taken_[q] = 1;
+            state_[q] = kVisited;
             part_.push_back(q);
             away_m_.push_back(away);
         }

@@ -35,30 +35,39 @@ class MovingParts {
     /// Requests tests of the segment's pixels around those that were found free.
     void request_around(const Frame& frame, const Segment& segment, EvidenceImage& evidence) const;
 
-    /// Connected parts of the segment around free pixels, without those that were occupied. Calls part(pixels) for
-    /// each.
-    template <class F>
-    void find(const Frame& frame, const Segment& segment, const EvidenceImage& evidence, F&& part) {
+    /// Connected parts of the segment around free pixels, without those that were occupied. Calls part(pixels) for each
+    /// and at last rest(pixels) for what is left.
+    template <class F, class G>
+    void find(const Frame& frame, const Segment& segment, const EvidenceImage& evidence, F&& part, G&& rest) {
         for (const PixelIndex seed : pixels_of(frame, segment)) {
-            if (starts(evidence, seed) && grow(frame, segment, evidence, seed))
-                part(std::span<const PixelIndex>(part_));
+            if (!starts(evidence, seed) || !grow(frame, segment, evidence, seed)) continue;
+            for (const PixelIndex pixel : part_) state_[pixel] = kInPart;
+            part(std::span<const PixelIndex>(part_));
         }
+        part_.clear();
+        for (const PixelIndex pixel : pixels_of(frame, segment)) {
+            if (state_[pixel] != kInPart) part_.push_back(pixel);
+        }
+        rest(std::span<const PixelIndex>(part_));
     }
     /// Starts a frame.
-    void begin() { taken_.fill(0); }
+    void begin() { state_.fill(kFresh); }
 
   private:
     static std::span<const PixelIndex> pixels_of(const Frame& frame, const Segment& segment) {
         return std::span(frame.prepared.pixels).subspan(segment.first, segment.count);
     }
     bool starts(const EvidenceImage& evidence, PixelIndex pixel) const {
-        return taken_[pixel] == 0 && evidence[pixel] == Evidence::kFree;
+        return state_[pixel] == kFresh && evidence[pixel] == Evidence::kFree;
     }
     bool grow(const Frame& frame, const Segment& segment, const EvidenceImage& evidence, PixelIndex seed);
 
     SensorModel sensor_;
     MovingPartsConfig config_;
-    Image<std::uint8_t> taken_;  ///< 1: the pixel has been looked at
+    static constexpr std::uint8_t kFresh = 0;
+    static constexpr std::uint8_t kVisited = 1;
+    static constexpr std::uint8_t kInPart = 2;
+    Image<std::uint8_t> state_;
     std::vector<PixelIndex> part_;
     std::vector<float> away_m_;  ///< of each of part_: way from the last free pixel
 };
