@@ -8,7 +8,8 @@ function(dlod_add_library name)
   endif()
 endfunction()
 
-# dlod_add_test_folder(FOLDER LINK libs...): one test program of all FOLDER/*_test.cpp, registered with CTest test by test.
+# dlod_add_test_folder(FOLDER LINK libs...): one test program of all FOLDER/*.cpp, registered with CTest test by test as
+# FOLDER/TEST with underscores in FOLDER. The target tests_TOP builds those of all folders under TOP.
 function(dlod_add_test_folder folder)
   cmake_parse_arguments(ARG "" "" "LINK" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${folder}/*.cpp)
@@ -18,6 +19,11 @@ function(dlod_add_test_folder folder)
   string(REPLACE "/" "_" name ${folder})
   add_executable(test_${name} ${sources})
   target_link_libraries(test_${name} PRIVATE ${ARG_LINK} dlod_test_main)
+  string(REGEX MATCH "^[^/]+" top ${folder})
+  if(NOT TARGET tests_${top})
+    add_custom_target(tests_${top})
+  endif()
+  add_dependencies(tests_${top} test_${name})
   gtest_discover_tests(test_${name} TEST_PREFIX "${name}/" WORKING_DIRECTORY ${PROJECT_SOURCE_DIR}
                        DISCOVERY_TIMEOUT 120 PROPERTIES TIMEOUT 300)
 endfunction()

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Installs what is missing, builds dlod (Release, in build/) and runs all tests. Can be run again at any time.
 # usage: tools/test.sh [--sanitizers] [CTEST_ARGUMENT...]
-#   --sanitizers   afterwards the tests once more under AddressSanitizer with UndefinedBehaviorSanitizer, and the threaded
-#                  ones under ThreadSanitizer
+#   --sanitizers   afterwards the tests of core and driver under AddressSanitizer with UndefinedBehaviorSanitizer, and
+#                  those of the pipeline under ThreadSanitizer
 # Further arguments go to ctest: tools/test.sh -R tracking
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -23,17 +23,20 @@ cmake --build build -j "$jobs"
 step "tests"
 ctest --test-dir build -j 2 --output-on-failure "$@"
 
-# sanitize NAME FLAGS TEST_PATTERN: builds the tests in build-NAME and runs those whose names match.
+# sanitize NAME FLAGS TARGETS TEST_PATTERN: builds the targets in build-NAME and runs the tests whose names match.
 sanitize() {
     step "$1 sanitizer: build"
-    cmake -S . -B "build-$1" -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DDLOD_SANITIZE="$2" -DDLOD_BUILD_TOOLS=OFF
-    cmake --build "build-$1" -j "$jobs"
+    # Little optimisation compiles fast and keeps stacks readable; asserts are on.
+    cmake -S . -B "build-$1" -G Ninja -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" \
+        -DDLOD_SANITIZE="$2" -DDLOD_BUILD_TOOLS=OFF
+    # shellcheck disable=SC2086  # several targets
+    cmake --build "build-$1" -j "$jobs" --target $3
     step "$1 sanitizer: tests"
-    ctest --test-dir "build-$1" -j 2 --output-on-failure -R "$3"
+    ctest --test-dir "build-$1" -j 2 --output-on-failure -R "$4"
 }
 if [[ $sanitizers == yes ]]; then
-    sanitize address address,undefined '^(core|driver)'
-    sanitize thread thread '^daemon'
+    sanitize address address,undefined "tests_core tests_driver" '^(core_|driver/)'
+    sanitize thread thread test_daemon_pipeline '^daemon_pipeline/'
 fi
 
 step "all tests passed"
