@@ -75,14 +75,14 @@ class Building {
                               Material::kMetal);
         }
         const double kind = random.uniform();
-        if (kind < 0.2) {  // closed for good
+        if (kind < 0.13) {  // closed for good
             const Vec2 leaf = middle + out * 0.05;
             b_.mesh().add_box(Vec3(leaf.x(), leaf.y(), 0.5 * kDoorHeight), Vec3(kDoorWidth, 0.05, kDoorHeight), along,
                               Material::kWood);
             b_.obstacles().push_back(Obstacle::wall(left, right, kWall));
-        } else if (kind < 0.45 && b_.options().movers) {
+        } else if (kind < 0.25 && b_.options().movers) {
             add_door(left + out * 0.05, along);
-        } else if (kind < 0.75) {  // stands open
+        } else if (kind < 0.6) {  // stands open
             const Vec2 leaf = left + out * (0.5 * kDoorWidth + 0.06);
             b_.mesh().add_box(Vec3(leaf.x(), leaf.y(), 0.5 * kDoorHeight), Vec3(kDoorWidth, 0.05, kDoorHeight),
                               std::atan2(out.y(), out.x()), Material::kWood);
@@ -233,6 +233,19 @@ World build_corridor(const SceneOptions& options) {
     add_wall(b, ring(-o, 1, -1), ring(-o, 1, 1), 0.0, kHeight);
     add_wall(b, ring(-o, -1, -1), ring(-o, -1, 1), 0.0, kHeight);
     add_corridor_furniture(b, building.doors());
+    for (int i = 0; i < 30; ++i) {  // boards and radiators on the walls
+        const bool lengthwise = i % 3 != 0;
+        const double side = b.random().sign();
+        const double off = b.random().sign() * (kHalfCorridor - 0.11);
+        const Vec2 p = lengthwise ? Vec2(b.random().uniform(-18.0, 18.0), side * kRing.y() + off)
+                                  : Vec2(side * kRing.x() + off, b.random().uniform(-9.0, 9.0));
+        const bool on_door = std::any_of(building.doors().begin(), building.doors().end(),
+                                         [&](const Vec2& door) { return (door - p).norm() < 1.2; });
+        if (on_door) continue;
+        const Vec3 size(b.random().uniform(0.6, 1.4), 0.1, b.random().uniform(0.4, 0.9));
+        b.mesh().add_box(Vec3(p.x(), p.y(), b.random().chance(0.5) ? 1.5 : 0.5), size,
+                         lengthwise ? 0.0 : 0.5 * std::numbers::pi, Material::kLightPaint);
+    }
     for (double x = -18.0; x <= 18.0; x += 4.0) {  // lamps
         for (const double y : {-kRing.y(), kRing.y()}) {
             b.mesh().add_box(Vec3(x, y, kHeight - 0.04), Vec3(1.2, 0.25, 0.08), 0.0, Material::kPlastic);
