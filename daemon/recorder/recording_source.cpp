@@ -68,16 +68,18 @@ void RecordingSource::enqueue(const driver::Packet& packet) {
 }
 
 void RecordingSource::write_until_stopped() {
-    std::unique_lock lock(mutex_);
-    for (int period = 1; !stopping_; ++period) {
-        stop_requested_.wait_for(lock, kWritePeriod, [this] { return stopping_; });
-        lock.unlock();
+    // What was queued before the stop was requested is written: the request is seen first, the queue emptied after it.
+    bool stopping = false;
+    for (int period = 1; !stopping; ++period) {
+        {
+            std::unique_lock lock(mutex_);
+            stop_requested_.wait_for(lock, kWritePeriod, [this] { return stopping_; });
+            stopping = stopping_;
+        }
         write_waiting();
-        if (period % kFlushEvery == 0) rotation_.flush();
+        if (stopping || period % kFlushEvery == 0) rotation_.flush();
         report_trouble();
-        lock.lock();
     }
-    rotation_.flush();
 }
 
 void RecordingSource::write_waiting() {

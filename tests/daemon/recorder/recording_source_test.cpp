@@ -84,6 +84,24 @@ TEST(RecordingSource, TheRecordingIsWhatPassed) {
     EXPECT_EQ(replay.next().status, driver::SourceStatus::kEnd);
 }
 
+TEST(RecordingSource, WhatWaitsAtTheEndIsWritten) {
+    const ScratchFolder scratch;
+    for (int round = 0; round < 20; ++round) {
+        {
+            Packets packets(3);
+            RecordingSource source(packets, {.folder = scratch.file("r").string(), .files = 100}, "");
+            source.next();
+        }
+        int files = 0;
+        for (const auto& entry : std::filesystem::directory_iterator(scratch.file("r"))) {
+            driver::PcapSource replay(entry.path());
+            for (int i = 0; i < 3; ++i) EXPECT_EQ(replay.next().status, driver::SourceStatus::kPackets);
+            ++files;
+        }
+        EXPECT_EQ(files, round + 1);
+    }
+}
+
 TEST(RecordingSource, AFullBufferCostsTheRecordingNotTheCaller) {
     const ScratchFolder scratch;
     Packets packets(3000);
