@@ -112,8 +112,7 @@ Bytes IpReassembly::add(const IpPacket& fragment, std::uint32_t vlan, std::int64
     if (slot != nullptr && expired(*slot, time_ns)) give_up(*slot, counters_.timed_out);
 
     const auto repeats = [&](const Slot& s) {
-        return piece.end <= kLargestDatagram &&
-               std::any_of(s.pieces.begin(), s.pieces.end(),
+        return std::any_of(s.pieces.begin(), s.pieces.end(),
                            [&](const Piece& p) { return p.begin == piece.begin && p.end == piece.end; }) &&
                std::memcmp(s.bytes.get() + piece.begin, fragment.payload.data(), size) == 0 &&
                (!last || s.length == piece.end);
