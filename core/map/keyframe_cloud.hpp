@@ -2,23 +2,20 @@
 #pragma once
 
 #include "core/odometry/feedback.hpp"
-#include "core/registration/placed_point.hpp"
-#include "core/registration/sweep_motion.hpp"
+#include "core/registration/placed_points.hpp"
 #include "core/types/frame.hpp"
 
 namespace dlod {
 
-/// All points of a scan, in the local frame that the motion leads to: the world moved to origin_m.
-inline void build_keyframe_cloud(const PointSelection& points, const SweepMotion& motion,
-                                 const Eigen::Vector3d& origin_m, KeyframeCloud& cloud) {
-    cloud.clear();
+/// All points of a scan, in a local frame: the world moved to origin_m.
+inline void build_keyframe_cloud(const PlacedPoints& placed, const Eigen::Vector3d& origin_m, KeyframeCloud& cloud) {
     cloud.T_world_sensor = Eigen::Translation3d(origin_m);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-        float T[12];
-        motion.at(points.time_s[i], T);
-        cloud.push(place(T, points.x[i], points.y[i], points.z[i]).position,
-                   place(T, points.nx[i], points.ny[i], points.nz[i]).lever);
-    }
+    cloud.x = placed.x;
+    cloud.y = placed.y;
+    cloud.z = placed.z;
+    cloud.nx = placed.nx;
+    cloud.ny = placed.ny;
+    cloud.nz = placed.nz;
 }
 
 /// Copies the frame's selected points, deskewed, without those whose pixel belongs to something that may move.
@@ -30,10 +27,18 @@ void build_keyframe_cloud(const Frame& frame, Predicate&& is_moving_pixel, Keyfr
     const PointSelection& points = frame.prepared.points;
     for (std::size_t i = 0; i < points.size(); ++i) {
         if (is_moving_pixel(points.pixel[i])) continue;
-        float T[12];
-        for (std::size_t k = 0; k < 12; ++k) T[k] = frame.odometry.deskew[k][points.measurement[i]];
-        cloud.push(place(T, points.x[i], points.y[i], points.z[i]).position,
-                   place(T, points.nx[i], points.ny[i], points.nz[i]).lever);
+        const std::size_t m = points.measurement[i];
+        const auto rotate = [&](std::size_t row, float x, float y, float z) {
+            const auto* d = &frame.odometry.deskew[4 * row];
+            return d[0][m] * x + d[1][m] * y + d[2][m] * z;
+        };
+        float position[3];
+        float normal[3];
+        for (std::size_t row = 0; row < 3; ++row) {
+            position[row] = rotate(row, points.x[i], points.y[i], points.z[i]) + frame.odometry.deskew[4 * row + 3][m];
+            normal[row] = rotate(row, points.nx[i], points.ny[i], points.nz[i]);
+        }
+        cloud.push(position, normal);
     }
 }
 

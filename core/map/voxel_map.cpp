@@ -169,7 +169,7 @@ void VoxelMap::fit(std::uint32_t slot) {
     plane.thickness_m = static_cast<float>(std::max(deviation[0], config_.noise_m));
     plane.extent_m[0] = static_cast<float>(deviation[2]);
     plane.extent_m[1] = static_cast<float>(deviation[1]);
-    plane.flat = deviation[0] <= config_.max_thickness_m && deviation[0] <= 0.5 * deviation[1];
+    plane.flat = m.count >= config_.min_points && deviation[0] <= config_.max_thickness_m && deviation[0] <= 0.5 * deviation[1];
 }
 
 }  // namespace dlod

@@ -31,7 +31,7 @@ struct VoxelMapConfig {
                     "side of a voxel; larger bridges sparser scans and rounds off detail");
         v.parameter("surfel_radius_m", surfel_radius_m, Range{0.0, 2.0}, "m",
                     "a point counts as a disc of this radius: its normal speaks while points are few");
-        v.parameter("min_points", min_points, Range{1, 100}, "points", "a voxel with fewer has no plane");
+        v.parameter("min_points", min_points, Range{1, 100}, "points", "a voxel with fewer is not flat");
         v.parameter("max_thickness_m", max_thickness_m, Range{0.001, 1.0}, "m",
                     "standard deviation across the plane up to which a voxel counts as flat");
         v.parameter("noise_m", noise_m, Range{0.0005, 0.5}, "m", "floor of that deviation");
@@ -58,7 +58,7 @@ struct alignas(64) VoxelPlane {
     float thickness_m;  ///< standard deviation along the normal, at least the configured floor
     float extent_m[2];  ///< standard deviations along the two tangents
     float tangent[3];   ///< direction of the larger extent
-    bool flat;          ///< false: the normal means nothing
+    bool flat;          ///< false: too few points or too thick, the normal means nothing
     std::uint32_t points;
 };
 
@@ -71,10 +71,10 @@ class VoxelMap {
     /// Takes away points that have been added before.
     void remove(std::span<const FixedPoint> points) { accumulate(points, -1); }
 
-    /// The voxel's plane, nullptr where it holds too few points. Fits it if needed.
+    /// The voxel's plane, nullptr where it is empty. Fits it if needed.
     const VoxelPlane* find(VoxelIndex index);
 
-    /// Calls f(index, plane) for each voxel with enough points in the 3 x 3 x 3 around `center`.
+    /// Calls f(index, plane) for each occupied voxel of the 3 x 3 x 3 around `center`.
     template <class F>
     void for_each_around(VoxelIndex center, F&& f);
 
@@ -170,8 +170,7 @@ inline const VoxelPlane* VoxelMap::find(VoxelIndex index) {
     const std::uint32_t slot = blocks_[block].slot[position_in_block(index)];
     if (slot == kNone) return nullptr;
     if (!fitted_[slot]) fit(slot);
-    const VoxelPlane& plane = planes_[slot];
-    return plane.points >= static_cast<std::uint32_t>(config_.min_points) ? &plane : nullptr;
+    return &planes_[slot];
 }
 
 template <class F>

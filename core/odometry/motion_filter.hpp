@@ -22,9 +22,9 @@ struct MotionFilterConfig {
     double accelerometer_noise = 0.05;
     double gyro_bias_walk = 1e-4;
     double accelerometer_bias_walk = 2e-3;
-    double acceleration = 0.8;
-    double angular_acceleration = 1.5;
-    double information_share = 0.02;
+    double acceleration = 0.3;
+    double angular_acceleration = 0.3;
+    double information_share = 0.01;
 
     template <class V>
     void visit(V& v) {

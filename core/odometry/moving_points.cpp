@@ -2,8 +2,6 @@
 
 #include <cmath>
 
-#include "core/registration/placed_point.hpp"
-
 namespace dlod {
 namespace {
 
@@ -19,8 +17,8 @@ void MovingPoints::set(std::span<const MovingBox> boxes, std::int64_t stamp_ns) 
     stamp_ns_ = stamp_ns;
 }
 
-void MovingPoints::mark(const PointSelection& points, const SweepMotion& motion, const Eigen::Vector3d& origin_m,
-                        std::int64_t stamp_ns, std::span<std::uint8_t> excluded) const {
+void MovingPoints::mark(const PlacedPoints& placed, const Eigen::Vector3d& origin_m, std::int64_t stamp_ns,
+                        std::span<std::uint8_t> excluded) const {
     const double age = static_cast<double>(stamp_ns - stamp_ns_) * 1e-9;
     if (boxes_.empty() || age < 0.0 || age > kMaxAge_s) return;
     struct Local {
@@ -40,15 +38,12 @@ void MovingPoints::mark(const PointSelection& points, const SweepMotion& motion,
         local[b].cosine = static_cast<float>(std::cos(box.yaw_rad));
         local[b].sine = static_cast<float>(std::sin(box.yaw_rad));
     }
-    for (std::size_t i = 0; i < points.size(); ++i) {
-        float T[12];
-        motion.at(points.time_s[i], T);
-        const PlacedPoint p = place(T, points.x[i], points.y[i], points.z[i]);
+    for (std::size_t i = 0; i < placed.size(); ++i) {
         for (std::size_t b = 0; b < boxes_.size(); ++b) {
             const Local& box = local[b];
-            const float dx = p.position[0] - box.center[0];
-            const float dy = p.position[1] - box.center[1];
-            const float dz = p.position[2] - box.center[2];
+            const float dx = placed.x[i] - box.center[0];
+            const float dy = placed.y[i] - box.center[1];
+            const float dz = placed.z[i] - box.center[2];
             if (dx * dx + dy * dy + dz * dz > box.reach2) continue;
             if (std::abs(box.cosine * dx + box.sine * dy) <= box.half[0] &&
                 std::abs(-box.sine * dx + box.cosine * dy) <= box.half[1] && std::abs(dz) <= box.half[2]) {

@@ -5,8 +5,7 @@
 #include <vector>
 
 #include "core/odometry/feedback.hpp"
-#include "core/registration/sweep_motion.hpp"
-#include "core/types/frame.hpp"
+#include "core/registration/placed_points.hpp"
 
 namespace dlod {
 
@@ -16,9 +15,9 @@ class MovingPoints {
     void set(std::span<const MovingBox> boxes, std::int64_t stamp_ns);
 
     /// Sets excluded to 1 for each point inside a box, moved on to the frame's stamp.
-    /// @param motion T_local_sensor, local being the world moved to origin_m
-    void mark(const PointSelection& points, const SweepMotion& motion, const Eigen::Vector3d& origin_m,
-              std::int64_t stamp_ns, std::span<std::uint8_t> excluded) const;
+    /// @param placed local frame: the world moved to origin_m
+    void mark(const PlacedPoints& placed, const Eigen::Vector3d& origin_m, std::int64_t stamp_ns,
+              std::span<std::uint8_t> excluded) const;
 
   private:
     std::vector<MovingBox> boxes_;

@@ -61,12 +61,12 @@ struct Odometry::State {
     void bootstrap(const Frame& frame);
     void register_frame(const Frame& frame, int first_stage_iterations, double widening);
     void register_widely(const Frame& frame);
-    void place_provisional(const SweepMotion& sweep, const Eigen::Vector3d& sweep_origin_m);
+    void place_provisional();
     bool is_trustworthy();
     void choose_origin();
     void update_sweep(const Frame& frame);
-    void place_target(const PointSelection& points, std::span<const std::uint8_t> without, const SweepMotion& sweep,
-                      const Eigen::Vector3d& sweep_origin_m, const Eigen::Isometry3d& T_world_sensor);
+    void place_target(const PointSelection& points, std::span<const std::uint8_t> without,
+                      const Eigen::Isometry3d& T_world_sensor);
     void see_turn(std::int64_t stamp_ns);
     void write_result(Frame& frame);
     Eigen::Vector3d mean_force(const Frame& frame) const;
@@ -83,10 +83,10 @@ struct Odometry::State {
     MovingPoints moving;
 
     bool started = false;
-    bool bootstrapping = false;   ///< the map is one scan that has not been deskewed for its velocity
-    MotionFilter first_filter;    ///< while bootstrapping: at the stamp of that scan
-    PointSelection first_points;  ///< while bootstrapping: of that scan
-    SweepMotion first_motion;     ///< while bootstrapping: of that scan
+    bool bootstrapping = false;     ///< the map is one scan that has not been deskewed for its velocity
+    MotionFilter first_filter;      ///< while bootstrapping: at the stamp of that scan
+    PointSelection first_points;    ///< while bootstrapping: of that scan
+    double first_duration_s = 0.0;  ///< while bootstrapping: of that scan
     std::int64_t last_registered_ns = 0;
     Eigen::Isometry3d T_world_target = Eigen::Isometry3d::Identity();     ///< pose of the first stage's target scan
     std::int64_t target_ns = 0;                                           ///< its stamp
@@ -97,6 +97,7 @@ struct Odometry::State {
     std::uint32_t flags = 0;
     bool registered = false;
     SweepMotion motion;
+    PlacedPoints placed;  ///< the frame's points after that motion
     VoxelIndex origin;
     Eigen::Vector3d origin_m = Eigen::Vector3d::Zero();
     std::size_t candidates = 0;  ///< points that might have found a counterpart
@@ -162,7 +163,7 @@ void Odometry::State::process(Frame& frame, const OdometryFeedback* feedback) {
         see_turn(frame.header.stamp_ns);
         usual_near += kNearSmoothing * (static_cast<double>(near) - usual_near);
         last_registered_ns = frame.header.stamp_ns;
-        place_target(frame.prepared.points, excluded, motion, origin_m, filter.T_world_sensor());
+        place_target(frame.prepared.points, excluded, filter.T_world_sensor());
     }
 }
 
@@ -213,7 +214,7 @@ bool Odometry::State::estimate(const Frame& frame) {
     if (!frame.header.usable) return false;
     const PointSelection& points = frame.prepared.points;
     keyframes.update_submap(filter.state().position_m);
-    moving.mark(points, motion, origin_m, frame.header.stamp_ns, excluded);
+    moving.mark(placed, origin_m, frame.header.stamp_ns, excluded);
     candidates = 0;
     for (std::size_t i = 0; i < points.size(); ++i) candidates += points.planarity[i] > 0.0F && !excluded[i] ? 1 : 0;
     if (bootstrapping) {
@@ -282,8 +283,8 @@ void Odometry::State::start(const Frame& frame, const Eigen::Isometry3d& T_world
     update_sweep(frame);
     first_filter = filter;
     first_points = frame.prepared.points;
-    first_motion = motion;
-    place_provisional(first_motion, origin_m);
+    first_duration_s = static_cast<double>(motion.duration_s);
+    place_provisional();
 }
 
 /// Goes on with a new map from where the robot is believed to be: it is lost, or the sensor's clock has jumped back.
@@ -312,9 +313,10 @@ void Odometry::State::bootstrap(const Frame& frame) {
                              ? again.state().rate_radps
                              : Eigen::Vector3d(again.state().rate_radps +
                                                again.state().rotation.conjugate() * correction.segment<3>(3) / dt));
-        again.sweep(static_cast<double>(first_motion.duration_s), Eigen::Vector3d::Zero(), first_motion);
-        place_provisional(first_motion, Eigen::Vector3d::Zero());
-        place_target(first_points, {}, first_motion, Eigen::Vector3d::Zero(), again.T_world_sensor());
+        again.sweep(first_duration_s, origin_m, motion);
+        place(first_points, motion, placed);
+        place_provisional();
+        place_target(first_points, {}, again.T_world_sensor());
         first_filter = again;
         filter = again;
         filter.predict(frame.header.stamp_ns);
@@ -334,13 +336,13 @@ void Odometry::State::register_widely(const Frame& frame) {
     if (static_cast<double>(near) > kClearlyBetter * narrow_near) return;
     filter = narrow;
     update_sweep(frame);
-    scan_to_submap.match(frame.prepared.points, excluded, motion, keyframes.submap(), origin, 1.0, matches);
+    scan_to_submap.match(frame.prepared.points, excluded, placed, keyframes.submap(), origin, 1.0, matches);
 }
 
-/// Makes the first scan the submap until there are keyframes.
-void Odometry::State::place_provisional(const SweepMotion& sweep, const Eigen::Vector3d& sweep_origin_m) {
+/// Makes the placed points, of the first scan, the submap until there are keyframes.
+void Odometry::State::place_provisional() {
     KeyframeCloud cloud;
-    build_keyframe_cloud(first_points, sweep, sweep_origin_m, cloud);
+    build_keyframe_cloud(placed, origin_m, cloud);
     keyframes.set_provisional(cloud);
 }
 
@@ -366,20 +368,21 @@ void Odometry::State::register_frame(const Frame& frame, int first_stage_iterati
         const Eigen::Isometry3f T_target_local =
             (T_world_target.inverse() * Eigen::Translation3d(origin_m)).cast<float>();
         iterate(first_stage_iterations,
-                [&](int) { scan_to_scan.match(points, excluded, motion, T_target_local, widening, matches); });
+                [&](int) { scan_to_scan.match(points, excluded, placed, T_target_local, widening, matches); });
         update_sweep(frame);
     }
     iterate(config.scan_to_submap.iterations, [&](int i) {
-        scan_to_submap.match(points, excluded, motion, keyframes.submap(), origin, i == 0 ? 2.0 * widening : 1.0,
+        scan_to_submap.match(points, excluded, placed, keyframes.submap(), origin, i == 0 ? 2.0 * widening : 1.0,
                              matches);
     });
     if (observability.unobservable > 0) flags |= OdometryResult::kDegenerate;
 }
 
-/// The motion over the sweep as the filter sees it now.
+/// The motion over the sweep as the filter sees it now, and the points after it.
 void Odometry::State::update_sweep(const Frame& frame) {
     const double duration = static_cast<double>(frame.header.stamp_ns - frame.header.first_stamp_ns) * 1e-9;
     filter.sweep(std::clamp(duration, 1e-3, kMaxSweep_s), origin_m, motion);
+    place(frame.prepared.points, motion, placed);
 }
 
 /// The local frame of this scan: the world moved to a corner of the voxels near the sensor.
@@ -404,13 +407,12 @@ void Odometry::State::see_turn(std::int64_t stamp_ns) {
     target_rotation = rotation;
 }
 
-/// Makes a registered scan the target of the first stage.
+/// Makes the placed points the target of the first stage.
 void Odometry::State::place_target(const PointSelection& points, std::span<const std::uint8_t> without,
-                                   const SweepMotion& sweep, const Eigen::Vector3d& sweep_origin_m,
                                    const Eigen::Isometry3d& T_world_sensor) {
     T_world_target = T_world_sensor;
-    const Eigen::Isometry3d T_local_sensor = Eigen::Translation3d(-sweep_origin_m) * T_world_sensor;
-    scan_to_scan.set_target(points, without, sweep, T_local_sensor.inverse().cast<float>());
+    const Eigen::Isometry3d T_local_sensor = Eigen::Translation3d(-origin_m) * T_world_sensor;
+    scan_to_scan.set_target(points, without, placed, T_local_sensor.inverse().cast<float>());
 }
 
 void Odometry::State::write_result(Frame& frame) {
@@ -428,7 +430,7 @@ void Odometry::State::write_result(Frame& frame) {
     out.valid = registered || (since_registered < kMaxPrediction_s &&
                                std::sqrt(out.covariance.diagonal().head<3>().sum()) < kMaxDeviation_m);
     deskew(sensor, motion, frame);
-    scan_to_submap.residuals(frame.prepared.points, motion, keyframes.submap(), origin, out.residual_pixel,
+    scan_to_submap.residuals(frame.prepared.points, placed, keyframes.submap(), origin, out.residual_pixel,
                              out.residual_m);
     // A first scan has been deskewed without its velocity: it is no keyframe.
     out.keyframe =

@@ -41,6 +41,8 @@ Subsampling::Subsampling(const SensorModel& sensor, const SubsamplingConfig& con
     const auto most = static_cast<std::size_t>(rows) * static_cast<std::size_t>(windows_.windows());
     flat_.reserve(most);
     rough_.reserve(most);
+    order_.reserve(most);
+    next_.reserve(static_cast<std::size_t>(sensor.width) + 1);
 }
 
 void Subsampling::process(Frame& frame) {
@@ -94,15 +96,31 @@ void Subsampling::collect_row(const Frame& frame, int row) {
     }
 }
 
+int Subsampling::measurement_of(PixelIndex pixel) const {
+    return sensor_.measurement_of(static_cast<int>(pixel) / sensor_.width, static_cast<int>(pixel) % sensor_.width);
+}
+
+/// Counting sort of 0 .. count - 1 into order_.
+template <class Measurement>
+void Subsampling::sort_by_measurement(std::size_t count, Measurement&& measurement) {
+    next_.assign(static_cast<std::size_t>(sensor_.width) + 1, 0);
+    for (std::size_t i = 0; i < count; ++i) ++next_[static_cast<std::size_t>(measurement(i)) + 1];
+    for (std::size_t m = 1; m < next_.size(); ++m) next_[m] += next_[m - 1];
+    order_.resize(count);
+    for (std::size_t i = 0; i < count; ++i)
+        order_[next_[static_cast<std::size_t>(measurement(i))]++] = static_cast<std::uint32_t>(i);
+}
+
 void Subsampling::select(Frame& frame) {
     PointSelection& points = frame.prepared.points;
     points.clear();
     const auto append = [&](PixelIndex pixel, const Eigen::Vector3f& normal, float planarity, float smoothing_m) {
-        const int row = static_cast<int>(pixel) / sensor_.width;
-        const int column = static_cast<int>(pixel) % sensor_.width;
-        const auto m = static_cast<std::size_t>(sensor_.measurement_of(row, column));
+        const auto m = static_cast<std::size_t>(measurement_of(pixel));
         Eigen::Vector3f p(frame.cloud.x[pixel], frame.cloud.y[pixel], frame.cloud.z[pixel]);
-        if (smoothing_m != 0.0F) p += smoothing_m * windows_.beam(row, column).direction;
+        if (smoothing_m != 0.0F)
+            p += smoothing_m *
+                 windows_.beam(static_cast<int>(pixel) / sensor_.width, static_cast<int>(pixel) % sensor_.width)
+                     .direction;
         points.pixel.push_back(pixel);
         points.measurement.push_back(static_cast<std::uint16_t>(m));
         points.x.push_back(p.x());
@@ -119,14 +137,21 @@ void Subsampling::select(Frame& frame) {
     const int share = fair_share(count, config_.points);
     // Every count/share-th of a bin, spread evenly over the image.
     std::array<int, kDirections> credit{};
-    for (const Candidate& candidate : flat_) {
+    std::erase_if(flat_, [&](const Candidate& candidate) {
         int& c = credit[candidate.direction];
         c += std::min(share, count[candidate.direction]);
-        if (c < count[candidate.direction]) continue;
+        if (c < count[candidate.direction]) return true;
         c -= count[candidate.direction];
-        append(candidate.pixel, {candidate.nx, candidate.ny, candidate.nz}, candidate.planarity, candidate.smoothing_m);
+        return false;
+    });
+    // In the order of their firing, so that neighbours share their place in the sweep.
+    sort_by_measurement(flat_.size(), [&](std::size_t i) { return measurement_of(flat_[i].pixel); });
+    for (const std::uint32_t i : order_) {
+        const Candidate& c = flat_[i];
+        append(c.pixel, {c.nx, c.ny, c.nz}, c.planarity, c.smoothing_m);
     }
-    for (const PixelIndex pixel : rough_) append(pixel, Eigen::Vector3f::Zero(), 0.0F, 0.0F);
+    sort_by_measurement(rough_.size(), [&](std::size_t i) { return measurement_of(rough_[i]); });
+    for (const std::uint32_t i : order_) append(rough_[i], Eigen::Vector3f::Zero(), 0.0F, 0.0F);
 }
 
 }  // namespace dlod

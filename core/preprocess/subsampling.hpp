@@ -12,7 +12,7 @@ struct SubsamplingConfig {
     int rows = 43;
     int column_step = 4;
     int rough_step = 1;
-    int points = 4000;
+    int points = 3000;
     double spacing_m = 0.12;
     double min_range_m = 0.5;
     double crop_box_m = 0.5;
@@ -42,7 +42,8 @@ struct SubsamplingConfig {
 };
 
 /// Selects the points of the registration: fills frame.prepared.points from the range image. Needs no pose.
-/// Flat points are smoothed over their window and carry its normal; the others are raw, with planarity 0.
+/// Flat points come first, are smoothed over their window and carry its normal; the others are raw, with planarity 0.
+/// Both are in the order of their firing.
 class Subsampling {
   public:
     Subsampling(const SensorModel& sensor, const SubsamplingConfig& config);
@@ -61,6 +62,9 @@ class Subsampling {
 
     void collect_row(const Frame& frame, int row);
     void select(Frame& frame);
+    int measurement_of(PixelIndex pixel) const;
+    template <class Measurement>
+    void sort_by_measurement(std::size_t count, Measurement&& measurement);
 
     SensorModel sensor_;
     SubsamplingConfig config_;
@@ -69,6 +73,8 @@ class Subsampling {
     std::vector<Candidate> flat_;
     std::vector<PixelIndex> rough_;
     std::vector<int> candidate_rows_;
+    std::vector<std::uint32_t> order_;  ///< scratch of sort_by_measurement
+    std::vector<std::uint32_t> next_;   ///< scratch of sort_by_measurement
 };
 
 }  // namespace dlod

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/registration/placed_point.hpp"
-
 namespace dlod {
 namespace {
 
@@ -38,16 +36,12 @@ int ScanToScan::cell_of(const float p[3]) {
 }
 
 void ScanToScan::set_target(const PointSelection& points, std::span<const std::uint8_t> excluded,
-                            const SweepMotion& motion, const Eigen::Isometry3f& T_sensor_local) {
+                            const PlacedPoints& placed, const Eigen::Isometry3f& T_sensor_local) {
     for (Surfel& surfel : grid_) surfel.set = false;
     for (std::size_t i = 0; i < points.size(); ++i) {
         if (points.planarity[i] <= 0.0F || (!excluded.empty() && excluded[i])) continue;
-        float T[12];
-        motion.at(points.time_s[i], T);
-        const PlacedPoint local = place(T, points.x[i], points.y[i], points.z[i]);
-        const PlacedPoint direction = place(T, points.nx[i], points.ny[i], points.nz[i]);
-        const Eigen::Vector3f p = T_sensor_local * Eigen::Map<const Eigen::Vector3f>(local.position);
-        const Eigen::Vector3f n = T_sensor_local.linear() * Eigen::Map<const Eigen::Vector3f>(direction.lever);
+        const Eigen::Vector3f p = T_sensor_local * Eigen::Vector3f(placed.x[i], placed.y[i], placed.z[i]);
+        const Eigen::Vector3f n = T_sensor_local.linear() * Eigen::Vector3f(placed.nx[i], placed.ny[i], placed.nz[i]);
         Surfel& surfel = grid_[static_cast<std::size_t>(cell_of(p.data()))];
         std::copy_n(p.data(), 3, surfel.position);
         std::copy_n(n.data(), 3, surfel.normal);
@@ -56,7 +50,7 @@ void ScanToScan::set_target(const PointSelection& points, std::span<const std::u
     filled_ = true;
 }
 
-void ScanToScan::match(const PointSelection& points, std::span<const std::uint8_t> excluded, const SweepMotion& motion,
+void ScanToScan::match(const PointSelection& points, std::span<const std::uint8_t> excluded, const PlacedPoints& placed,
                        const Eigen::Isometry3f& T_target_local, double widening, PlaneMatches& matches) const {
     matches.reserve(points.size());
     matches.clear();
@@ -67,21 +61,17 @@ void ScanToScan::match(const PointSelection& points, std::span<const std::uint8_
     const std::size_t step = std::max<std::size_t>(1, points.size() / static_cast<std::size_t>(config_.points));
     for (std::size_t i = 0; i < points.size(); i += step) {
         if (points.planarity[i] <= 0.0F || excluded[i]) continue;
-        float T[12];
-        motion.at(points.time_s[i], T);
-        const PlacedPoint local = place(T, points.x[i], points.y[i], points.z[i]);
-        const Eigen::Vector3f p = T_target_local * Eigen::Map<const Eigen::Vector3f>(local.position);
+        const Eigen::Vector3f p = T_target_local * Eigen::Vector3f(placed.x[i], placed.y[i], placed.z[i]);
         const Surfel& surfel = grid_[static_cast<std::size_t>(cell_of(p.data()))];
         if (!surfel.set) continue;
         const Eigen::Vector3f d = p - Eigen::Map<const Eigen::Vector3f>(surfel.position);
         const Eigen::Vector3f n = R_local_target * Eigen::Map<const Eigen::Vector3f>(surfel.normal);
         const float residual = d.dot(Eigen::Map<const Eigen::Vector3f>(surfel.normal));
         if (std::abs(residual) > gate) continue;
-        const PlacedPoint direction = place(T, points.nx[i], points.ny[i], points.nz[i]);
-        if (dot(direction.lever, n.data()) < min_cosine) continue;
+        if (n.dot(Eigen::Vector3f(placed.nx[i], placed.ny[i], placed.nz[i])) < min_cosine) continue;
         const float fall = 1.0F / (1.0F + residual * residual / (kernel * kernel));
-        matches.push(n.data(), local.lever, residual, points.planarity[i] * fall * fall / kNoiseVariance,
-                     points.time_s[i]);
+        const float lever[3] = {placed.lx[i], placed.ly[i], placed.lz[i]};
+        matches.push(n.data(), lever, residual, points.planarity[i] * fall * fall / kNoiseVariance, points.time_s[i]);
     }
 }
 

@@ -9,7 +9,7 @@
 #include <span>
 
 #include "core/registration/normal_equations.hpp"
-#include "core/registration/sweep_motion.hpp"
+#include "core/registration/placed_points.hpp"
 #include "core/types/frame.hpp"
 #include "core/types/parameter.hpp"
 
@@ -37,16 +37,16 @@ class ScanToScan {
 
     /// Keeps the flat points of a registered scan as the next one's target.
     /// @param excluded by point, 1: left out; empty: none
-    /// @param motion T_local_sensor of that scan
-    /// @param T_sensor_local inverse of its last knot, the pose at its stamp
-    void set_target(const PointSelection& points, std::span<const std::uint8_t> excluded, const SweepMotion& motion,
+    /// @param placed the points in that scan's local frame
+    /// @param T_sensor_local sends that frame into the sensor's at the stamp
+    void set_target(const PointSelection& points, std::span<const std::uint8_t> excluded, const PlacedPoints& placed,
                     const Eigen::Isometry3f& T_sensor_local);
     void clear_target() { filled_ = false; }
     bool has_target() const { return filled_; }
 
-    /// @param motion T_local_sensor of the scan to be registered
+    /// @param placed the points in this scan's local frame
     /// @param T_target_local sends local coordinates into the sensor frame at the target's stamp
-    void match(const PointSelection& points, std::span<const std::uint8_t> excluded, const SweepMotion& motion,
+    void match(const PointSelection& points, std::span<const std::uint8_t> excluded, const PlacedPoints& placed,
                const Eigen::Isometry3f& T_target_local, double widening, PlaneMatches& matches) const;
 
   private:

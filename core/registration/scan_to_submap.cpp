@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/registration/placed_point.hpp"
-
 namespace dlod {
 namespace {
+
+inline float dot(const float a[3], const float b[3]) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
 
 /// Voxel around q, and q relative to its centre.
 struct Cell {
@@ -38,7 +40,15 @@ float distance_to(const VoxelPlane& plane, const float offset[3]) {
 /// The nearest of the Gaussians in the 26 voxels around an empty one.
 float distance_to_neighbours(VoxelMap& map, const Cell& cell, float side, float cap) {
     float nearest = cap;
+    // A voxel whose nearest side is farther than the best so far has nothing to offer.
+    const auto gap = [&](int step, float offset) {
+        return step == 0 ? 0.0F : 0.5F * side - static_cast<float>(step) * offset;
+    };
     map.for_each_around(cell.index, [&](VoxelIndex index, const VoxelPlane& plane) {
+        const float gx = gap(index.x - cell.index.x, cell.offset[0]);
+        const float gy = gap(index.y - cell.index.y, cell.offset[1]);
+        const float gz = gap(index.z - cell.index.z, cell.offset[2]);
+        if (gx * gx + gy * gy + gz * gz >= nearest * nearest) return;
         const float offset[3] = {cell.offset[0] - static_cast<float>(index.x - cell.index.x) * side,
                                  cell.offset[1] - static_cast<float>(index.y - cell.index.y) * side,
                                  cell.offset[2] - static_cast<float>(index.z - cell.index.z) * side};
@@ -50,7 +60,7 @@ float distance_to_neighbours(VoxelMap& map, const Cell& cell, float side, float 
 }  // namespace
 
 void ScanToSubmap::match(const PointSelection& points, std::span<const std::uint8_t> excluded,
-                         const SweepMotion& motion, VoxelMap& map, VoxelIndex origin, double widening,
+                         const PlacedPoints& placed, VoxelMap& map, VoxelIndex origin, double widening,
                          PlaneMatches& matches) const {
     const auto side = static_cast<float>(map.voxel_m());
     const float inverse_side = 1.0F / side;
@@ -62,25 +72,24 @@ void ScanToSubmap::match(const PointSelection& points, std::span<const std::uint
     matches.clear();
     for (std::size_t i = 0; i < points.size(); ++i) {
         if (points.planarity[i] <= 0.0F || excluded[i]) continue;
-        float T[12];
-        motion.at(points.time_s[i], T);
-        const PlacedPoint p = place(T, points.x[i], points.y[i], points.z[i]);
-        const Cell cell = cell_of(p.position, origin, side, inverse_side);
+        const float q[3] = {placed.x[i], placed.y[i], placed.z[i]};
+        const Cell cell = cell_of(q, origin, side, inverse_side);
         const VoxelPlane* plane = map.find(cell.index);
         if (plane == nullptr || !plane->flat) continue;
         const float d[3] = {cell.offset[0] - plane->mean[0], cell.offset[1] - plane->mean[1],
                             cell.offset[2] - plane->mean[2]};
         const float residual = dot(d, plane->normal);
         if (std::abs(residual) > gate) continue;
-        const PlacedPoint normal = place(T, points.nx[i], points.ny[i], points.nz[i]);
-        if (std::abs(dot(normal.lever, plane->normal)) < min_cosine) continue;
+        const float normal[3] = {placed.nx[i], placed.ny[i], placed.nz[i]};
+        if (std::abs(dot(normal, plane->normal)) < min_cosine) continue;
         const float fall = 1.0F / (1.0F + residual * residual * inverse_kernel2);
         const float weight = points.planarity[i] * fall * fall / (plane->thickness_m * plane->thickness_m);
-        matches.push(plane->normal, p.lever, residual, weight, points.time_s[i]);
+        const float lever[3] = {placed.lx[i], placed.ly[i], placed.lz[i]};
+        matches.push(plane->normal, lever, residual, weight, points.time_s[i]);
     }
 }
 
-void ScanToSubmap::residuals(const PointSelection& points, const SweepMotion& motion, VoxelMap& map, VoxelIndex origin,
+void ScanToSubmap::residuals(const PointSelection& points, const PlacedPoints& placed, VoxelMap& map, VoxelIndex origin,
                              AlignedVector<PixelIndex>& pixel, AlignedVector<float>& residual_m) const {
     const auto side = static_cast<float>(map.voxel_m());
     const float inverse_side = 1.0F / side;
@@ -88,10 +97,8 @@ void ScanToSubmap::residuals(const PointSelection& points, const SweepMotion& mo
     pixel.assign(points.pixel.begin(), points.pixel.end());
     residual_m.resize(points.size());
     for (std::size_t i = 0; i < points.size(); ++i) {
-        float T[12];
-        motion.at(points.time_s[i], T);
-        const PlacedPoint p = place(T, points.x[i], points.y[i], points.z[i]);
-        const Cell cell = cell_of(p.position, origin, side, inverse_side);
+        const float q[3] = {placed.x[i], placed.y[i], placed.z[i]};
+        const Cell cell = cell_of(q, origin, side, inverse_side);
         const VoxelPlane* plane = map.find(cell.index);
         residual_m[i] = plane != nullptr ? std::min(cap, distance_to(*plane, cell.offset))
                                          : distance_to_neighbours(map, cell, side, cap);

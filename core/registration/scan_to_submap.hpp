@@ -9,7 +9,7 @@
 
 #include "core/map/voxel_map.hpp"
 #include "core/registration/normal_equations.hpp"
-#include "core/registration/sweep_motion.hpp"
+#include "core/registration/placed_points.hpp"
 #include "core/types/frame.hpp"
 #include "core/types/parameter.hpp"
 
@@ -41,14 +41,14 @@ class ScanToSubmap {
     explicit ScanToSubmap(const ScanToSubmapConfig& config) : config_(config) {}
 
     /// Finds each flat point's plane.
-    /// @param motion T_local_sensor, local being the world moved to the lower corner of voxel `origin`
+    /// @param placed the same points in the local frame: the world moved to the lower corner of voxel `origin`
     /// @param excluded by point, 1: weighs nothing
     /// @param widening factor on gate and kernel: above 1 while the guess is poor
-    void match(const PointSelection& points, std::span<const std::uint8_t> excluded, const SweepMotion& motion,
+    void match(const PointSelection& points, std::span<const std::uint8_t> excluded, const PlacedPoints& placed,
                VoxelMap& map, VoxelIndex origin, double widening, PlaneMatches& matches) const;
 
     /// Distances of all points to the nearest Gaussian of the submap around them: the residuals of the registration.
-    void residuals(const PointSelection& points, const SweepMotion& motion, VoxelMap& map, VoxelIndex origin,
+    void residuals(const PointSelection& points, const PlacedPoints& placed, VoxelMap& map, VoxelIndex origin,
                    AlignedVector<PixelIndex>& pixel, AlignedVector<float>& residual_m) const;
 
   private:

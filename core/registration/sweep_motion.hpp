@@ -13,12 +13,18 @@ struct SweepMotion {
     float rows[kKnots][12];   ///< T_local_sensor, row-major 3 x 4; the last knot is the stamp
     float duration_s = 0.1F;  ///< time from the first knot to the last
 
+    float step_s() const { return duration_s / static_cast<float>(kKnots - 1); }
+    /// Time of a knot relative to the stamp.
+    float time_of(int knot) const { return static_cast<float>(knot) * step_s() - duration_s; }
+    /// The last knot but one at most, the first one at least.
+    int knot_before(float time_s) const {
+        return std::clamp(static_cast<int>((time_s + duration_s) * (static_cast<float>(kKnots - 1) / duration_s)), 0,
+                          kKnots - 2);
+    }
     /// T_local_sensor at a time relative to the stamp (at most 0); before the first knot, the first knot's.
     void at(float time_s, float pose[12]) const {
-        const float scaled = (time_s + duration_s) * (static_cast<float>(kKnots - 1) / duration_s);
-        const float position = std::clamp(scaled, 0.0F, static_cast<float>(kKnots - 1));
-        const int k = std::min(static_cast<int>(position), kKnots - 2);
-        const float f = position - static_cast<float>(k);
+        const int k = knot_before(time_s);
+        const float f = std::clamp((time_s - time_of(k)) / step_s(), 0.0F, 1.0F);
         for (int i = 0; i < 12; ++i) pose[i] = rows[k][i] + f * (rows[k + 1][i] - rows[k][i]);
     }
 };
