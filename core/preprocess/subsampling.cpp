@@ -8,6 +8,9 @@
 namespace dlod {
 namespace {
 
+// Weight of a raw point against a smoothed one of a perfect plane.
+constexpr float kRawPlanarity = 0.1F;
+
 /// Face of a cube that the direction points through, in quarters.
 std::uint8_t direction_bin(const Eigen::Vector3f& n) {
     Eigen::Index axis;
@@ -151,7 +154,15 @@ void Subsampling::select(Frame& frame) {
         append(c.pixel, {c.nx, c.ny, c.nz}, c.planarity, c.smoothing_m);
     }
     sort_by_measurement(rough_.size(), [&](std::size_t i) { return measurement_of(rough_[i]); });
-    for (const std::uint32_t i : order_) append(rough_[i], Eigen::Vector3f::Zero(), 0.0F, 0.0F);
+    const int available = static_cast<int>(rough_.size());
+    const int wanted = std::clamp(config_.least_points - static_cast<int>(flat_.size()), 0, available);
+    int raw_credit = 0;
+    for (const std::uint32_t i : order_) {
+        raw_credit += wanted;
+        const bool takes_part = raw_credit >= available && wanted > 0;
+        if (takes_part) raw_credit -= available;
+        append(rough_[i], Eigen::Vector3f::Zero(), takes_part ? kRawPlanarity : 0.0F, 0.0F);
+    }
 }
 
 }  // namespace dlod

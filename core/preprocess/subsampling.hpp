@@ -13,6 +13,7 @@ struct SubsamplingConfig {
     int column_step = 4;
     int rough_step = 1;
     int points = 3000;
+    int least_points = 2000;
     double spacing_m = 0.12;
     double min_range_m = 0.5;
     double crop_box_m = 0.5;
@@ -28,6 +29,8 @@ struct SubsamplingConfig {
                     "every n-th candidate of what is not flat; lower sees smaller moving objects");
         v.parameter("points", points, Range{200, 50000}, "points",
                     "flat points kept, evened out over the directions of their normals");
+        v.parameter("least_points", least_points, Range{0, 50000}, "points",
+                    "with fewer flat points raw ones make up for them: many columns lost, or nothing flat");
         v.parameter("spacing_m", spacing_m, Range{0.0, 5.0}, "m",
                     "near surfaces are thinned to about this spacing along a row");
         v.parameter("min_range_m", min_range_m, Range{0.0, 10.0}, "m",

@@ -42,6 +42,7 @@ void ScanToScan::set_target(const PointSelection& points, std::span<const std::u
         if (points.planarity[i] <= 0.0F || (!excluded.empty() && excluded[i])) continue;
         const Eigen::Vector3f p = T_sensor_local * Eigen::Vector3f(placed.x[i], placed.y[i], placed.z[i]);
         const Eigen::Vector3f n = T_sensor_local.linear() * Eigen::Vector3f(placed.nx[i], placed.ny[i], placed.nz[i]);
+        if (n.isZero()) continue;
         Surfel& surfel = grid_[static_cast<std::size_t>(cell_of(p.data()))];
         std::copy_n(p.data(), 3, surfel.position);
         std::copy_n(n.data(), 3, surfel.normal);

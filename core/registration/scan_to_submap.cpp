@@ -81,7 +81,8 @@ void ScanToSubmap::match(const PointSelection& points, std::span<const std::uint
         const float residual = dot(d, plane->normal);
         if (std::abs(residual) > gate) continue;
         const float normal[3] = {placed.nx[i], placed.ny[i], placed.nz[i]};
-        if (std::abs(dot(normal, plane->normal)) < min_cosine) continue;
+        const bool raw = points.nx[i] == 0.0F && points.ny[i] == 0.0F && points.nz[i] == 0.0F;
+        if (!raw && std::abs(dot(normal, plane->normal)) < min_cosine) continue;
         const float fall = 1.0F / (1.0F + residual * residual * inverse_kernel2);
         const float weight = points.planarity[i] * fall * fall / (plane->thickness_m * plane->thickness_m);
         const float lever[3] = {placed.lx[i], placed.ly[i], placed.lz[i]};

@@ -55,8 +55,8 @@ struct PointSelection {
     AlignedVector<PixelIndex> pixel;
     AlignedVector<std::uint16_t> measurement;  ///< column in which it was fired
     AlignedVector<float> x, y, z;     ///< sensor frame at firing time, metres
-    AlignedVector<float> nx, ny, nz;  ///< unit normal towards the sensor, from the range-image window
-    AlignedVector<float> planarity;   ///< 0 (scattered) .. 1 (flat): trust in the normal
+    AlignedVector<float> nx, ny, nz;  ///< unit normal towards the sensor, from the range-image window; 0, 0, 0: unknown
+    AlignedVector<float> planarity;   ///< weight in the registration: 1 flat .. 0 no part in it
     AlignedVector<float> time_s;      ///< firing time relative to the frame's stamp, at most 0
     std::size_t size() const { return pixel.size(); }
     void clear() {

@@ -40,7 +40,7 @@ class OdometryRun {
         feedback.has_keyframe = frame_.odometry.keyframe;
         if (feedback.has_keyframe)
             build_keyframe_cloud(
-                frame_, [](PixelIndex) { return false; }, feedback.keyframe);
+                frame_, [&](PixelIndex pixel) { return drive_.is_moving(pixel); }, feedback.keyframe);
         ++count_;
         const double stamp = static_cast<double>(frame_.header.stamp_ns - SimulatedDrive::kEpoch_ns) * 1e-9;
         const OdometryResult& o = frame_.odometry;

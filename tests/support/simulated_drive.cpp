@@ -28,6 +28,7 @@ SimulatedDrive::SimulatedDrive(std::vector<SceneBox> scene, Trajectory trajector
     sensor_.column_window_last = options.width - 1;
     sensor_.frame_period_s = options.period_s;
     sensor_.beam_origin_m = 0.0277F;
+    moving_.resize(options.height, options.width);
     for (int r = 0; r < options.height; ++r) {
         const double altitude = kPi / 4.0 - kPi / 2.0 * (r + 0.5) / options.height;
         sensor_.altitude_rad.push_back(static_cast<float>(altitude));
@@ -45,8 +46,8 @@ double SimulatedDrive::stamp_s(int k) const {
     return (k + static_cast<double>(options_.width - 1) / options_.width) * options_.period_s;
 }
 
-double SimulatedDrive::cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& d, double time_s) const {
-    double best = options_.max_range_m;
+SimulatedDrive::Hit SimulatedDrive::cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& d, double time_s) const {
+    Hit best{options_.max_range_m, false};
     for (const SceneBox& box : scene_) {
         double enter = -1e9;
         double leave = 1e9;
@@ -59,9 +60,9 @@ double SimulatedDrive::cast(const Eigen::Vector3d& origin, const Eigen::Vector3d
         }
         if (leave < enter) continue;
         const double hit = box.inside ? leave : enter;
-        if (hit > 0.05 && hit < best) best = hit;
+        if (hit > 0.05 && hit < best.distance) best = {hit, !box.velocity.isZero()};
     }
-    return best < options_.max_range_m ? best : 0.0;
+    return best.distance < options_.max_range_m ? best : Hit{};
 }
 
 ImuSample SimulatedDrive::imu_at(double t) {
@@ -102,6 +103,7 @@ void SimulatedDrive::fill(int k, Frame& frame) {
         frame.imu.push_back(sample);
     }
     frame.raw.range_mm.fill(0);
+    moving_.fill(0);
     for (auto* image : {&frame.cloud.range_m, &frame.cloud.x, &frame.cloud.y, &frame.cloud.z}) image->fill(0.0F);
     const double n = static_cast<double>(sensor_.beam_origin_m);
     for (int m = 0; m < w; ++m) {
@@ -123,12 +125,13 @@ void SimulatedDrive::fill(int k, Frame& frame) {
             const double p = static_cast<double>(sensor_.altitude_rad[row]);
             const Eigen::Vector3d direction(std::cos(a) * std::cos(p), std::sin(a) * std::cos(p), std::sin(p));
             const Eigen::Vector3d start(n * std::cos(theta), n * std::sin(theta), 0.0);
-            double distance = cast(T_world_lidar * start, T_world_lidar.linear() * direction, time);
-            if (distance <= 0.0) continue;
-            distance += options_.range_noise_m * normal_(random_);
+            const Hit hit = cast(T_world_lidar * start, T_world_lidar.linear() * direction, time);
+            if (hit.distance <= 0.0) continue;
+            const double distance = hit.distance + options_.range_noise_m * normal_(random_);
             const auto range_mm = static_cast<std::uint32_t>(std::lround((distance + n) * 1000.0 / 8.0)) * 8U;
             if (range_mm == 0) continue;
             const int c = (m + sensor_.pixel_shift[row]) % w;
+            moving_(r, c) = hit.moving ? 1 : 0;
             frame.raw.range_mm(r, c) = range_mm;
             const Eigen::Vector3d p_lidar = start + (range_mm * 1e-3 - n) * direction;
             const Eigen::Vector3f point = (sensor_.T_sensor_lidar * p_lidar).cast<float>();

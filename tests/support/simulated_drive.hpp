@@ -46,6 +46,8 @@ class SimulatedDrive {
     /// Fills header, raw ranges, columns, IMU samples and cloud of frame k, which begins at k periods.
     void fill(int k, Frame& frame);
     Eigen::Isometry3d pose(double time_s) const { return trajectory_(time_s); }
+    /// True where the last frame's pixel shows something that moves.
+    bool is_moving(PixelIndex pixel) const { return moving_[pixel] != 0; }
     /// Time of a frame's stamp in seconds.
     double stamp_s(int k) const;
 
@@ -57,13 +59,18 @@ class SimulatedDrive {
     static constexpr std::int64_t kEpoch_ns = 1'000'000'000'000;
 
   private:
-    double cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double time_s) const;
+    struct Hit {
+        double distance = 0.0;  ///< 0: none
+        bool moving = false;
+    };
+    Hit cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double time_s) const;
     ImuSample imu_at(double time_s);
 
     std::vector<SceneBox> scene_;
     Trajectory trajectory_;
     DriveOptions options_;
     SensorModel sensor_;
+    Image<std::uint8_t> moving_;
     std::mt19937_64 random_;
     std::normal_distribution<double> normal_;
     double next_imu_s_ = 0.003;
