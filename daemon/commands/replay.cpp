@@ -46,7 +46,11 @@ class ProgressBar {
 std::filesystem::path metadata_of(const ReplayArguments& arguments) {
     if (arguments.metadata) return *arguments.metadata;
     auto path = arguments.capture;
-    return path.replace_extension(".json");
+    path.replace_extension(".json");
+    if (!std::filesystem::exists(path)) {
+        throw driver::MetadataError(path.string() + ": not there; give the sensor's metadata with --metadata");
+    }
+    return path;
 }
 
 /// Ports as configured, else as the metadata says, else those that the sensor's packets go to.

@@ -10,8 +10,10 @@
 namespace dlod::daemon {
 namespace {
 
-/// Two under construction, one at work and one waiting at each of the heavier stages, two at the lighter ones.
-constexpr std::size_t kFramesInFlight = 9;
+/// Two under construction, and one at work and one waiting at each of the heavier stages.
+constexpr std::size_t kReplayFrames = 9;
+/// Live, none may be missing although every stage has one at work and one waiting.
+constexpr std::size_t kLiveFrames = 13;
 /// Between stages: what is further ahead is only older when its turn comes.
 constexpr std::size_t kQueueLength = 1;
 
@@ -32,7 +34,8 @@ Pipeline::Pipeline(const driver::SensorInfo& sensor, const MethodConfig& method,
       sinks_(std::move(sinks)),
       options_(std::move(options)),
       done_descriptor_(make_event_descriptor()),
-      pool_(sensor.model, kFramesInFlight + (options_.live ? static_cast<std::size_t>(options_.waiting_frames) : 0)),
+      pool_(sensor.model,
+            options_.live ? kLiveFrames + static_cast<std::size_t>(options_.waiting_frames) : kReplayFrames),
       to_prepare_(pool_.size()),
       to_odometry_(kQueueLength),
       to_detection_(kQueueLength),
