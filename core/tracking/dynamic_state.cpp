@@ -15,7 +15,7 @@ constexpr double kTall_m = 0.4;           // detections of that height count in 
 constexpr double kMostUnconfirmed = 0.6;  // of what makes an object dynamic, without free space
 constexpr double kUnconfirmed = 0.3;      // trust in a displacement where no free space was tested
 constexpr double kMaxLogOdds = 8.0;       // bounds keep a belief reversible
-constexpr double kMaxStep = 3.0;          // one frame alone never decides
+constexpr double kMaxStep = 2.4;          // one frame alone never decides
 constexpr double kAway_m = 0.15;          // from the mean place of rest
 constexpr double kRestMean = 0.1;         // weight of a new position in that mean
 constexpr int kAwayDetections = 2;        // in a row off the place of rest: it has set off
@@ -36,7 +36,8 @@ double motion_log_odds(const MotionCues& cues, const DynamicStateConfig& config)
         trust = kUnconfirmed;
         if (share >= 0.0) {
             const double tested = cues.free_points + cues.occupied_points;
-            const double known = tested / (tested + cues.unknown_points);
+            // The unknown says nothing; but where most is unknown, what is known is an edge more often.
+            const double known = std::sqrt(tested / (tested + cues.unknown_points));
             // A single row is as often an edge seen at a grazing angle as a thing of its own.
             const double tall = std::min(1.0, cues.height_m / kTall_m);
             // Errors come in a few pixels: the more were tested, the smaller a share is believed in. Of a long object

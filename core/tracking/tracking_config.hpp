@@ -73,7 +73,7 @@ struct DynamicStateConfig {
     double theta_res = 0.3;
     double theta_disp_m = 0.75;
     int min_hits = 2;
-    double dynamic_log_odds = 3.5;
+    double dynamic_log_odds = 2.6;
     double static_log_odds = -3.0;
     double free_weight = 1.4;
     double free_fraction = 0.35;
