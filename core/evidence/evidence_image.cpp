@@ -1,10 +1,13 @@
 #include "core/evidence/evidence_image.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace dlod {
 namespace {
 
+constexpr float kThinStep_m = 0.15F;
+constexpr float kThinStepPerMetre = 0.02F;
 // A requested pixel counts as unknown until run() has tested it.
 constexpr auto kRequested = static_cast<std::uint8_t>(Evidence::kUnknown);
 
@@ -12,6 +15,20 @@ constexpr auto kRequested = static_cast<std::uint8_t>(Evidence::kUnknown);
 Evidence judge(float free, float occupied) {
     if (free >= 1.0F && occupied <= free + 1.0F) return Evidence::kFree;
     return occupied >= 1.0F ? Evidence::kOccupied : Evidence::kUnknown;
+}
+
+/// A return that no neighbour above or below, or none to both sides, is near to: a plate or wire thinner than the beams
+/// are apart, which some frames see and others miss, or a beam that met two surfaces and measured neither.
+bool is_thin(const Image<float>& range_m, PixelIndex pixel) {
+    const auto width = static_cast<PixelIndex>(range_m.width());
+    const auto size = static_cast<PixelIndex>(range_m.size());
+    const PixelIndex column = pixel % width;
+    const float own = range_m[pixel];
+    const float step = kThinStep_m + kThinStepPerMetre * own;
+    const auto apart = [&](PixelIndex other) { return other >= size || std::abs(range_m[other] - own) > step; };
+    return (apart(pixel - width) && apart(pixel + width)) ||
+           (apart(column == 0 ? pixel + width - 1 : pixel - 1) &&
+            apart(column + 1 == width ? pixel + 1 - width : pixel + 1));
 }
 
 }  // namespace
@@ -64,7 +81,11 @@ void EvidenceImage::run(const Frame& frame) {
     sort_into_blocks(frame.odometry);
     requested_.clear();
     free_space_.test(frame, selected_, points_);
-    for (std::size_t i = 0; i < points_.size(); ++i) set(points_.pixel[i], judge(points_.free[i], points_.occupied[i]));
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+        const PixelIndex pixel = points_.pixel[i];
+        const Evidence evidence = judge(points_.free[i], points_.occupied[i]);
+        set(pixel, evidence == Evidence::kFree && is_thin(frame.cloud.range_m, pixel) ? Evidence::kUnknown : evidence);
+    }
 }
 
 }  // namespace dlod

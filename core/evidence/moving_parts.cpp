@@ -75,9 +75,12 @@ bool MovingParts::grow(const Frame& frame, const Segment& segment, const Evidenc
             away_m_.push_back(away);
         }
     }
+    const double min_height = segment.count > static_cast<std::uint32_t>(config_.small_segment)
+                                  ? config_.min_carved_height_m
+                                  : config_.min_height_m;
     const auto [low, high] = std::minmax_element(
         part_.begin(), part_.end(), [&](PixelIndex a, PixelIndex b) { return odometry.z[a] < odometry.z[b]; });
-    if (static_cast<double>(odometry.z[*high] - odometry.z[*low]) < config_.min_height_m) return false;
+    if (static_cast<double>(odometry.z[*high] - odometry.z[*low]) < min_height) return false;
     return part_.size() >= static_cast<std::size_t>(config_.min_points) &&
            static_cast<double>(free) >= config_.min_free_share * static_cast<double>(part_.size());
 }

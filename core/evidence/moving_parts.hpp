@@ -14,6 +14,8 @@ struct MovingPartsConfig {
     double reach_m = 0.3;
     int min_points = 6;
     double min_height_m = 0.15;
+    double min_carved_height_m = 0.4;
+    int small_segment = 80;
     double min_free_share = 0.4;
 
     template <class V>
@@ -23,6 +25,10 @@ struct MovingPartsConfig {
         v.parameter("min_points", min_points, Range{1, 1000}, "pixels", "smaller parts are noise");
         v.parameter("min_height_m", min_height_m, Range{0.0, 2.0}, "m",
                     "flatter parts are noise: thin plates lie between the beams in some frames");
+        v.parameter("min_carved_height_m", min_carved_height_m, Range{0.0, 2.0}, "m",
+                    "likewise of parts of larger segments: what moves there is at least so tall");
+        v.parameter("small_segment", small_segment, Range{1, 10000}, "pixels",
+                    "segments of more pixels are larger ones");
         v.parameter("min_free_share", min_free_share, Range{0.0, 1.0}, "1",
                     "share of a part's pixels that must lie where it was free");
     }
