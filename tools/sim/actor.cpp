@@ -1,6 +1,8 @@
 #include "tools/sim/actor.hpp"
 
+#include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "core/types/lie.hpp"
 

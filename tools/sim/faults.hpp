@@ -25,10 +25,6 @@ struct FaultOptions {
     ImuFault imu = ImuFault::kNone;
 
     static constexpr double kRestart_s = 0.55;
-    bool any() const {
-        return loss > 0.0 || duplication > 0.0 || reordering > 0.0 || corruption > 0.0 || !gaps_s.empty() ||
-               !restarts_s.empty() || !sectors_deg.empty() || imu != ImuFault::kNone;
-    }
 };
 
 enum class PacketFault { kNone, kLost, kDuplicated, kReordered, kCorrupted };

@@ -78,6 +78,7 @@ Lidar::Lidar(const driver::SensorInfo& sensor, const World& world, double durati
 }
 
 void Lidar::measure(const Hit* hits, Random& random, Echo& first, Echo& second) const {
+    static_assert(kShare.size() == kSubRays);
     // Energies of the beam's parts, nearest first.
     struct Glint {
         float distance_m;

@@ -2,16 +2,18 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <sstream>
-#include <thread>
 
 #include "driver/network_address.hpp"
 #include "driver/pcap_writer.hpp"
@@ -52,6 +54,10 @@ struct Options {
     std::vector<std::string> sectors;
 };
 
+const std::map<std::string, ImuFault> kImuFaults{{"good", ImuFault::kNone},     {"off", ImuFault::kOff},
+                                                 {"silent", ImuFault::kSilent}, {"stuck", ImuFault::kStuck},
+                                                 {"spikes", ImuFault::kSpikes}, {"axes", ImuFault::kAxes}};
+
 /// Two numbers with a colon between.
 std::pair<double, double> parse_pair(const std::string& text, const char* option) {
     std::istringstream in(text);
@@ -89,7 +95,9 @@ std::string describe(const FaultOptions& f) {
     if (!f.gaps_s.empty()) j["gaps_s"] = f.gaps_s;
     if (!f.restarts_s.empty()) j["restarts_s"] = f.restarts_s;
     if (!f.sectors_deg.empty()) j["sectors_deg"] = f.sectors_deg;
-    if (f.imu != ImuFault::kNone) j["imu"] = static_cast<int>(f.imu);
+    for (const auto& [name, fault] : kImuFaults) {
+        if (f.imu == fault && fault != ImuFault::kNone) j["imu"] = name;
+    }
     return j.dump();
 }
 
@@ -146,12 +154,9 @@ void add_options(CLI::App& app, Options& o) {
     app.add_option("--restart", o.faults.restarts_s, "the sensor restarts at these times (s)");
     app.add_option("--missing-sector", o.sectors, "columns between two encoder angles are invalid, degrees")
         ->type_name("FROM:TO");
-    const std::map<std::string, ImuFault> imu{{"good", ImuFault::kNone},     {"off", ImuFault::kOff},
-                                              {"silent", ImuFault::kSilent}, {"stuck", ImuFault::kStuck},
-                                              {"spikes", ImuFault::kSpikes}, {"axes", ImuFault::kAxes}};
     app.add_option("--imu", o.faults.imu,
                    "good; off: none; silent: ends after 40 %; stuck: one value after 30 %; spikes; axes: wrong ones")
-        ->transform(CLI::CheckedTransformer(imu))
+        ->transform(CLI::CheckedTransformer(kImuFaults))
         ->type_name("STATE");
 
     app.add_option("--live", o.live, "send over UDP at true rate; the ports are the metadata's, or PORT and PORT + 1")

@@ -1,5 +1,6 @@
 #include "tools/sim/props.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 

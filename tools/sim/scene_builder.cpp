@@ -1,5 +1,6 @@
 #include "tools/sim/scene_builder.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "tools/sim/actors/cyclist.hpp"

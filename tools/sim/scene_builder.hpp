@@ -17,9 +17,6 @@ namespace dlod::tools::sim {
 struct Rectangle {
     Vec2 low = Vec2::Zero();
     Vec2 high = Vec2::Zero();
-    bool contains(const Vec2& p) const {
-        return p.x() >= low.x() && p.x() <= high.x() && p.y() >= low.y() && p.y() <= high.y();
-    }
 };
 
 class SceneBuilder {

@@ -1,5 +1,6 @@
 #include "tools/sim/sensor_metadata.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>

@@ -35,11 +35,6 @@ class Spline {
         return ((*this)(t + kHalfStep_s) - (*this)(t - kHalfStep_s)) / (2.0 * kHalfStep_s);
     }
 
-    Value second_derivative(double t) const {
-        constexpr double kStep_s = 1e-3;
-        return ((*this)(t + kStep_s) - 2.0 * (*this)(t) + (*this)(t - kStep_s)) / (kStep_s * kStep_s);
-    }
-
   private:
     const Value& knot(std::ptrdiff_t i) const {
         const auto last = static_cast<std::ptrdiff_t>(knots_.size()) - 1;

@@ -1,5 +1,6 @@
 #include "tools/sim/actors/vehicle.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/types/lie.hpp"

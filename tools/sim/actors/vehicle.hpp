@@ -13,7 +13,7 @@ Mesh bus_mesh();
 
 class Vehicle final : public Actor {
   public:
-    /// `shape`: where the scene has put the mesh; `length_m` between the axles' contact points, for slopes.
+    /// `shape`: where the scene has put the mesh.
     Vehicle(std::string kind, Motion motion, Terrain terrain, int shape);
 
     void place(double t, std::vector<Eigen::Isometry3d>& T_world_part) const override;

@@ -1,4 +1,5 @@
 // A yard where people and a dog go round the robot again and again, and two walk beside it when it moves.
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 

@@ -1,4 +1,5 @@
 // A hillside: a paved ramp, stairs beside it, a grassy bank, walls and hedges, people on all of them.
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 

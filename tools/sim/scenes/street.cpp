@@ -1,4 +1,5 @@
 // A street: lanes with a light, parked cars, side streets, pavements with people, cyclists.
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 

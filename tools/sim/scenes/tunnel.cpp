@@ -1,4 +1,5 @@
 // A bare tunnel: along it nothing tells how far one has come. Structure only beyond its ends.
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
