@@ -108,7 +108,6 @@ void ReferenceImages::insert(const Frame& frame) {
     fill_poses(frame, reference);
     fill_windows(frame.cloud, reference);
     reference.stamp_ns = frame.header.stamp_ns;
-    reference.number = inserted_;
     for (int level = 0; level < levels_ && inserted_ % (std::uint64_t{1} << level) == 0; ++level) {
         int* latest = &slots_[2 * static_cast<std::size_t>(level)];
         if (latest[1] >= 0) --users_[static_cast<std::size_t>(latest[1])];

@@ -27,7 +27,6 @@ struct Reference {
     /// the wide ones, for near points.
     AlignedVector<std::uint32_t> cells;
     std::int64_t stamp_ns = 0;
-    std::uint64_t number = 0;  ///< counts references from 0
 };
 
 /// Keeps the last frame and about one in each octave of age (2, 4, 8 ... frames back), in constant memory. Frames in

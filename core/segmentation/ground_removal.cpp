@@ -120,7 +120,8 @@ void GroundRemoval::update_sensor_height(const StructuredCloud& cloud) {
     const auto highest = static_cast<float>(-config_.min_sensor_height_m);
     constexpr int kColumnStep = 8;
     constexpr float kFarthest_m = 15.0F;
-    for (int r = sensor_.height - 1; r >= std::max(kRowsAbove, top_row()); --r) {
+    const int top = std::max(kRowsAbove, top_row());
+    for (int r = sensor_.height - 1; r >= top; --r) {
         const float wall_rise = wall_rise_[static_cast<std::size_t>(r)];
         for (int c = 0; c < sensor_.width; c += kColumnStep) {
             const Eigen::Vector3f here(cloud.x(r, c), cloud.y(r, c), cloud.z(r, c));

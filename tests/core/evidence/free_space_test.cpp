@@ -1,0 +1,130 @@
+#include "core/evidence/free_space.hpp"
+
+#include <gtest/gtest.h>
+
+#include "core/evidence/evidence_image.hpp"
+#include "tests/support/rendered_scene.hpp"
+
+namespace dlod {
+namespace {
+
+constexpr double kPeriod_s = 0.1;
+
+/// A sensor whose rows look to different sides and are shifted accordingly.
+SensorModel staggered_sensor() {
+    SensorModel sensor = test::even_sensor(64, 1024, 0.4, -0.4);
+    for (std::size_t r = 0; r < 64; ++r) {
+        const double offset_rad = 0.18 - 0.12 * static_cast<double>(r % 4);
+        sensor.azimuth_offset_rad[r] = static_cast<float>(offset_rad);
+        sensor.pixel_shift[r] = static_cast<int>(std::lround((offset_rad + 0.2) / (2.0 * std::numbers::pi) * 1024));
+    }
+    return sensor;
+}
+
+/// Pose of a robot that drives 2 m/s and turns `yaw_rate`, at time t.
+Eigen::Isometry3d pose_at(double t_s, double yaw_rate) {
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    pose.linear() = Eigen::AngleAxisd(yaw_rate * t_s, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+    pose.translation() = Eigen::Vector3d(2.0 * t_s, 0.3 * t_s, 1.0);
+    return pose;
+}
+
+/// Shoots each column at its own time and fills the true deskewing.
+void render_sweep(const SensorModel& sensor, const test::Scene& scene, int number, double yaw_rate, Frame& frame) {
+    const auto column_time = [&](int m) { return kPeriod_s * (number + static_cast<double>(m + 1) / sensor.width); };
+    const Eigen::Isometry3d stamp = pose_at(column_time(sensor.width - 1), yaw_rate);
+    frame.header.stamp_ns = static_cast<std::int64_t>(1e9 * column_time(sensor.width - 1));
+    frame.odometry.valid = true;
+    frame.odometry.T_world_sensor = stamp;
+    for (int m = 0; m < sensor.width; ++m) {
+        const Eigen::Isometry3d world = pose_at(column_time(m), yaw_rate);
+        const Eigen::Isometry3d deskew = stamp.inverse() * world;
+        for (int i = 0; i < 12; ++i) {
+            frame.odometry.deskew[i][static_cast<std::size_t>(m)] = static_cast<float>(deskew(i / 4, i % 4));
+        }
+        for (int r = 0; r < sensor.height; ++r) {
+            const int c = (m + sensor.pixel_shift[static_cast<std::size_t>(r)]) % sensor.width;
+            const Eigen::Vector3d direction = test::beam(sensor, r, c);
+            const double range = std::max(0.0, scene(world.translation(), world.linear() * direction));
+            const Eigen::Vector3f p = (range * direction).cast<float>();
+            const Eigen::Vector3f q = deskew.cast<float>() * p;
+            frame.cloud.range_m(r, c) = static_cast<float>(range);
+            frame.cloud.x(r, c) = p.x(), frame.cloud.y(r, c) = p.y(), frame.cloud.z(r, c) = p.z();
+            frame.odometry.x(r, c) = q.x(), frame.odometry.y(r, c) = q.y(), frame.odometry.z(r, c) = q.z();
+        }
+    }
+}
+
+/// A closed room with pillars: depth edges all around.
+double pillars(const Eigen::Vector3d& o, const Eigen::Vector3d& d) {
+    double range = test::plane_range(Eigen::Vector3d::UnitZ(), -0.5, o, d);
+    for (const double side : {-1.0, 1.0}) {
+        range = test::nearest(range, test::plane_range(Eigen::Vector3d::UnitX(), 15.0 * side, o, d));
+        range = test::nearest(range, test::plane_range(Eigen::Vector3d::UnitY(), 15.0 * side, o, d));
+    }
+    range = test::nearest(range, test::plane_range(Eigen::Vector3d::UnitZ(), 6.0, o, d));
+    for (int i = 0; i < 12; ++i) {
+        const double a = 2.0 * std::numbers::pi * i / 12.0;
+        const Eigen::Vector3d foot(7.0 * std::cos(a), 7.0 * std::sin(a), -0.5);
+        range = test::nearest(
+            range, test::box_range(foot - Eigen::Vector3d(0.2, 0.2, 0.0), foot + Eigen::Vector3d(0.2, 0.2, 4.0), o, d));
+    }
+    return range;
+}
+
+class Turning : public testing::TestWithParam<double> {};
+
+/// Motion within the sweep, the rows' shifts and the image's seam are all accounted for: nothing static is ever free.
+TEST_P(Turning, StaticRoomIsOccupiedWhileTheSensorTurns) {
+    const SensorModel sensor = staggered_sensor();
+    Frame frame(sensor);
+    EvidenceImage evidence(sensor, {});
+    long tested = 0;
+    long free = 0;
+    long occupied = 0;
+    for (int k = 0; k < 14; ++k) {
+        render_sweep(sensor, pillars, k, GetParam(), frame);
+        evidence.begin();
+        for (PixelIndex p = 0; p < sensor.pixels(); p += 3) evidence.request(p);
+        evidence.run(frame);
+        for (const PixelIndex p : evidence.tested()) {
+            if (k < 10) continue;
+            ++tested;
+            free += evidence[p] == Evidence::kFree ? 1 : 0;
+            occupied += evidence[p] == Evidence::kOccupied ? 1 : 0;
+        }
+        evidence.remember(frame);
+    }
+    ASSERT_GT(tested, 50000);
+    EXPECT_LE(free, tested / 2000);
+    EXPECT_GE(occupied, 0.8 * static_cast<double>(tested));
+}
+
+INSTANTIATE_TEST_SUITE_P(YawRates, Turning, testing::Values(0.0, 1.5, -1.5));
+
+TEST(ReferenceImages, AgesAreSpreadAndMemoryIsBounded) {
+    const SensorModel sensor = test::even_sensor(4, 64, 0.1, -0.1);
+    Frame frame(sensor);
+    frame.odometry.valid = true;
+    ReferenceImages references(sensor, 5);
+    EXPECT_TRUE(references.select().empty());
+    for (int k = 0; k < 200; ++k) {
+        frame.header.stamp_ns = k;
+        references.insert(frame);
+        if (k < 64) continue;
+        std::vector<std::int64_t> ages;
+        for (const Reference* reference : references.select()) ages.push_back(k + 1 - reference->stamp_ns);
+        ASSERT_EQ(ages.size(), 6U);
+        EXPECT_EQ(ages[0], 1);
+        for (std::size_t i = 1; i < ages.size(); ++i) {
+            // The i-th lies within the octave that ends at 2^i frames.
+            EXPECT_GT(ages[i], 1 << (i - 1));
+            EXPECT_LE(ages[i], 1 << i);
+        }
+    }
+    references.clear();
+    EXPECT_TRUE(references.select().empty());
+}
+
+}  // namespace
+}  // namespace dlod
