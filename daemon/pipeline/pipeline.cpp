@@ -53,24 +53,27 @@ Pipeline::Pipeline(const driver::SensorInfo& sensor, const MethodConfig& method,
       map_(to_map_, to_write_, [this](PipelineFrame& frame) { update_map(frame); }),
       write_(to_write_, pool_.finished(), [this](PipelineFrame& frame) { write(frame); }),
       ingest_(source, sensor, frames, pool_, to_prepare_, prepare_, events_,
-              {.live = options_.live, .paced = options_.live || options_.paced}) {}
+              {.live = options_.live, .paced = receives_on_own_thread()}),
+      workers_(actors(), events_, [this] { signal_if_done(); }) {}
 
 Pipeline::~Pipeline() {
     source_.stop();
-    workers_.reset();
+    workers_.stop();
     ingest_.abandon();
     if (receiver_.joinable()) receiver_.join();
     ::close(done_descriptor_);
 }
 
-void Pipeline::start() {
+std::vector<Actor*> Pipeline::actors() {
     // The most advanced frame first: it is the oldest, and its data are still in the cache.
     std::vector<Actor*> actors = {&write_, &map_, &publish_, &detection_, &odometry_, &prepare_};
-    const bool own_thread = options_.live || options_.paced;
-    if (!own_thread) actors.push_back(&ingest_);
-    workers_ = std::make_unique<WorkerPool>(std::move(actors), options_.threads, events_, options_.on_thread_start,
-                                            [this] { signal_if_done(); });
-    if (own_thread) {
+    if (!receives_on_own_thread()) actors.push_back(&ingest_);
+    return actors;
+}
+
+void Pipeline::start() {
+    workers_.start(options_.threads, options_.on_thread_start);
+    if (receives_on_own_thread()) {
         receiver_ = std::thread([this] {
             if (options_.on_thread_start) options_.on_thread_start(options_.threads);
             ingest_.run_until_end();
@@ -80,7 +83,7 @@ void Pipeline::start() {
 }
 
 bool Pipeline::done() const {
-    return (workers_ && workers_->failed()) ||
+    return workers_.failed() ||
            (ingest_.ended() && write_.completed() + prepare_.dropped_frames() == ingest_.emitted_frames());
 }
 
@@ -96,7 +99,7 @@ bool Pipeline::moves_on() {
 }
 
 void Pipeline::rethrow_failure() const {
-    if (workers_ && workers_->failed()) std::rethrow_exception(workers_->failure());
+    if (workers_.failed()) std::rethrow_exception(workers_.failure());
 }
 
 void Pipeline::signal_if_done() {

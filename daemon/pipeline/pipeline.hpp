@@ -9,7 +9,6 @@
 
 #include <array>
 #include <functional>
-#include <memory>
 #include <thread>
 #include <vector>
 
@@ -72,6 +71,8 @@ class Pipeline {
     void update_map(PipelineFrame& frame);
     void write(PipelineFrame& frame);
     void signal_if_done();
+    bool receives_on_own_thread() const { return options_.live || options_.paced; }
+    std::vector<Actor*> actors();
 
     driver::Geometry geometry_;
     DynamicLidarOdometry method_;
@@ -105,7 +106,7 @@ class Pipeline {
     std::array<Progress, 6> progress_{};
     std::uint64_t ingest_steps_ = 0;
 
-    std::unique_ptr<WorkerPool> workers_;
+    WorkerPool workers_;
     std::thread receiver_;
 };
 

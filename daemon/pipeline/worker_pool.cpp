@@ -1,12 +1,8 @@
 #include "daemon/pipeline/worker_pool.hpp"
 
-#include <utility>
-
 namespace dlod::daemon {
 
-WorkerPool::WorkerPool(std::vector<Actor*> actors, int threads, EventCount& events,
-                       const std::function<void(int)>& on_start, std::function<void()> on_progress)
-    : actors_(std::move(actors)), events_(events), on_progress_(std::move(on_progress)) {
+void WorkerPool::start(int threads, const std::function<void(int)>& on_start) {
     for (int i = 0; i < threads; ++i) {
         threads_.emplace_back([this, i, on_start] {
             if (on_start) on_start(i);
@@ -15,10 +11,11 @@ WorkerPool::WorkerPool(std::vector<Actor*> actors, int threads, EventCount& even
     }
 }
 
-WorkerPool::~WorkerPool() {
+void WorkerPool::stop() {
     stopping_.store(true, std::memory_order_release);
     events_.notify();
     for (auto& thread : threads_) thread.join();
+    threads_.clear();
 }
 
 void WorkerPool::work() {

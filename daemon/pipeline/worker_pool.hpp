@@ -6,6 +6,7 @@
 #include <exception>
 #include <functional>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace dlod::daemon {
@@ -46,15 +47,18 @@ class Actor {
 
 class WorkerPool {
   public:
-    /// Starts the threads. @param actors in order of urgency, all must outlive the pool
-    /// @param on_start called first on each thread, with its number
+    /// @param actors in order of urgency, all must outlive the pool
     /// @param on_progress called after each piece of work, on the thread that did it
-    WorkerPool(std::vector<Actor*> actors, int threads, EventCount& events, const std::function<void(int)>& on_start,
-               std::function<void()> on_progress);
-    /// Ends the threads after what they are at.
-    ~WorkerPool();
+    WorkerPool(std::vector<Actor*> actors, EventCount& events, std::function<void()> on_progress)
+        : actors_(std::move(actors)), events_(events), on_progress_(std::move(on_progress)) {}
+    ~WorkerPool() { stop(); }
     WorkerPool(const WorkerPool&) = delete;
     WorkerPool& operator=(const WorkerPool&) = delete;
+
+    /// @param on_start called first on each thread, with its number
+    void start(int threads, const std::function<void(int)>& on_start = {});
+    /// Ends the threads after what they are at.
+    void stop();
 
     /// True once an actor has thrown: nothing runs any more.
     bool failed() const { return failed_.load(std::memory_order_acquire); }

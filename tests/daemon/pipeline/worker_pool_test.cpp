@@ -35,10 +35,11 @@ TEST(WorkerPool, RunsEachActorOnOneThreadAtATime) {
     EventCount events;
     std::atomic<int> pieces{0};
     {
-        WorkerPool pool({&a, &b}, 4, events, {}, [&] {
+        WorkerPool pool({&a, &b}, events, [&] {
             ++pieces;
             pieces.notify_all();
         });
+        pool.start(4);
         for (int seen = pieces.load(); seen < 2 * kLimit; seen = pieces.load()) pieces.wait(seen);
     }
     EXPECT_EQ(a.count(), kLimit);
@@ -48,7 +49,8 @@ TEST(WorkerPool, RunsEachActorOnOneThreadAtATime) {
 TEST(WorkerPool, IdleWorkersSleep) {
     CountingActor none(0);
     EventCount events;
-    WorkerPool pool({&none}, 4, events, {}, [] {});
+    WorkerPool pool({&none}, events, [] {});
+    pool.start(4);
     const auto cpu_s = [] {
         timespec t{};
         ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
@@ -67,10 +69,11 @@ TEST(WorkerPool, AFailureEndsAllWork) {
     } failing;
     EventCount events;
     std::atomic<bool> told{false};
-    WorkerPool pool({&failing}, 2, events, {}, [&] {
+    WorkerPool pool({&failing}, events, [&] {
         told = true;
         told.notify_all();
     });
+    pool.start(2);
     told.wait(false);
     ASSERT_TRUE(pool.failed());
     EXPECT_THROW(std::rethrow_exception(pool.failure()), std::runtime_error);
