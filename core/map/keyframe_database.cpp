@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/map/keyframe_hulls.hpp"
+
 namespace dlod {
 namespace {
 
@@ -94,6 +96,7 @@ void KeyframeDatabase::add(const KeyframeCloud& cloud) {
     if (keyframes_.size() >= static_cast<std::size_t>(config_.max_keyframes)) {
         forget_farthest(cloud.T_world_sensor.translation());
     }
+    hulls_are_old_ = true;
     Keyframe& keyframe = keyframes_.emplace_back();
     keyframe.position_m = cloud.T_world_sensor.translation();
     keyframe.rotation = Eigen::Quaterniond(cloud.T_world_sensor.rotation());
@@ -144,6 +147,26 @@ void KeyframeDatabase::remove_points(const OrientedBox& box) {
     }
 }
 
+/// The nearest of those keyframes, as many as there may be.
+void KeyframeDatabase::choose(std::size_t most, std::uint8_t Keyframe::*wanted) {
+    for (std::size_t i = 0, taken = 0; i < order_.size() && taken < most; ++i) {
+        if (!(keyframes_[order_[i].second].*wanted)) continue;
+        chosen_[order_[i].second] = 1;
+        ++taken;
+    }
+}
+
+void KeyframeDatabase::update_hulls() {
+    hulls_are_old_ = false;
+    positions_.clear();
+    for (Keyframe& keyframe : keyframes_) {
+        positions_.push_back(keyframe.position_m);
+        keyframe.on_convex_hull = keyframe.on_concave_hull = 0;
+    }
+    for (const std::size_t i : convex_hull(positions_)) keyframes_[i].on_convex_hull = 1;
+    for (const std::size_t i : concave_hull(positions_, config_.concave_alpha_m)) keyframes_[i].on_concave_hull = 1;
+}
+
 void KeyframeDatabase::update_submap(const Eigen::Vector3d& position_m) {
     order_.clear();
     for (std::size_t i = 0; i < keyframes_.size(); ++i) {
@@ -153,6 +176,9 @@ void KeyframeDatabase::update_submap(const Eigen::Vector3d& position_m) {
     chosen_.assign(keyframes_.size(), 0);
     const auto nearest = std::min(order_.size(), static_cast<std::size_t>(config_.nearest));
     for (std::size_t i = 0; i < nearest; ++i) chosen_[order_[i].second] = 1;
+    if (hulls_are_old_) update_hulls();
+    choose(static_cast<std::size_t>(config_.convex_hull), &Keyframe::on_convex_hull);
+    choose(static_cast<std::size_t>(config_.concave_hull), &Keyframe::on_concave_hull);
     for (std::size_t i = 0; i < keyframes_.size(); ++i) {
         Keyframe& keyframe = keyframes_[i];
         if (keyframe.in_submap == (chosen_[i] != 0)) continue;

@@ -22,6 +22,7 @@ struct KeyframeConfig {
     int nearest = 20;
     int convex_hull = 5;
     int concave_hull = 5;
+    double concave_alpha_m = 5.0;
     int max_keyframes = 300;
 
     template <class V>
@@ -37,6 +38,8 @@ struct KeyframeConfig {
                     "nearest ones of the convex hull of all, in the submap");
         v.parameter("concave_hull", concave_hull, Range{0, 200}, "keyframes",
                     "nearest ones of the concave hull of all, in the submap");
+        v.parameter("concave_alpha_m", concave_alpha_m, Range{0.1, 1000.0}, "m",
+                    "radius of the circles that dent the concave hull");
         v.parameter("max_keyframes", max_keyframes, Range{2, 10000}, "keyframes",
                     "beyond this the farthest is forgotten");
     }
@@ -77,11 +80,15 @@ class KeyframeDatabase {
         std::vector<FixedPoint> points;
         Eigen::Vector3d low_m, high_m;  ///< bounds of the points, world
         Matrix6d covariance;            ///< of the pose, translation and rotation, world
+        std::uint8_t on_convex_hull = 0;
+        std::uint8_t on_concave_hull = 0;
         bool in_submap = false;
     };
 
     static void convert(const KeyframeCloud& cloud, std::vector<FixedPoint>& points);
     void forget_farthest(const Eigen::Vector3d& position_m);
+    void update_hulls();
+    void choose(std::size_t most, std::uint8_t Keyframe::*wanted);
 
     KeyframeConfig config_;
     VoxelMap submap_;
@@ -92,6 +99,8 @@ class KeyframeDatabase {
     };
     std::vector<Announced> announced_;
     std::vector<FixedPoint> provisional_;
+    bool hulls_are_old_ = false;
+    std::vector<Eigen::Vector3d> positions_;             ///< scratch of update_hulls
     std::vector<std::uint8_t> chosen_;                   ///< scratch of update_submap
     std::vector<std::pair<double, std::size_t>> order_;  ///< scratch of update_submap
 };
