@@ -341,6 +341,12 @@ void FrameBuilder::finish(Frame& frame, const Slot& slot, std::uint32_t frame_id
         header.stamp_ns = frame.columns.time_ns[m];
         ++header.valid_columns;
     }
+    if (header.valid_columns == 0 && last_stamp_ns_ != 0) {
+        // No column tells the time: a turn after the frame before.
+        header.stamp_ns = last_stamp_ns_ + static_cast<std::int64_t>(info_.model.frame_period_s * 1e9);
+        header.first_stamp_ns = header.stamp_ns;
+    }
+    last_stamp_ns_ = header.stamp_ns;
     header.usable = header.valid_columns > 0 && header.valid_columns >= config_.minimum_valid_share * window_columns_;
     frame.imu.clear();
     if (header.valid_columns > 0) {

@@ -15,13 +15,15 @@ constexpr double kForgottenShare = 0.1;  // of a full map, at a time
 // A run too short to confirm much: what has stayed for this share of it is static.
 constexpr double kConfirmShareOfRun = 0.25;
 constexpr std::int64_t kDecisecond_ns = 100'000'000;
+constexpr std::int64_t kLongestTurn_ns =
+    1'000'000'000;  // a longer step is the clock's, or a gap in which nothing was seen
 
 /// Near pixels lie many to a cell: of each four that are looked at, so many are skipped.
 constexpr float kNear_m = 8.0F, kMiddle_m = 16.0F;
 
 /// What one frame adds and clears, kept until it is its turn.
 struct Postponed {
-    std::int64_t stamp_ns = 0;
+    std::int64_t time_ns = 0;
     std::vector<MapPoint> points;
     std::vector<OrientedBox> cleared;
 };
@@ -31,8 +33,8 @@ Persistence::Rule rule_of(const GlobalMapConfig& config) {
             static_cast<std::uint16_t>(std::lround(10.0 * config.forget_s))};
 }
 
-std::uint16_t deciseconds(std::int64_t stamp_ns) {
-    return static_cast<std::uint16_t>(stamp_ns / kDecisecond_ns);
+std::uint16_t deciseconds(std::int64_t time_ns) {
+    return static_cast<std::uint16_t>(time_ns / kDecisecond_ns);
 }
 
 }  // namespace
@@ -59,9 +61,9 @@ struct GlobalMap::State {
     CellTable cells;
     std::vector<Postponed> waiting;  ///< ring over the frames
     std::uint64_t frames = 0;
-    std::int64_t first_stamp_ns = 0;
     std::int64_t last_stamp_ns = 0;
-    std::int64_t entered_stamp_ns = 0;
+    std::int64_t time_ns = 0;          ///< time that has passed, whatever the sensor's clock did
+    std::int64_t entered_time_ns = 0;  ///< of the frame that entered last
     std::size_t sweep_slot = 0;
     std::vector<OrientedBox> to_clear;
     Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
@@ -90,7 +92,7 @@ void GlobalMap::finish() {
 
 std::vector<MapPoint> GlobalMap::points() const {
     const State& s = *state_;
-    const double run_ds = static_cast<double>(s.last_stamp_ns - s.first_stamp_ns) / static_cast<double>(kDecisecond_ns);
+    const double run_ds = static_cast<double>(s.time_ns) / static_cast<double>(kDecisecond_ns);
     const double enough_ds = std::min<double>(s.rule.confirm_ds, kConfirmShareOfRun * run_ds);
     return s.cells.sorted([&](const Persistence& seen) { return seen.confirmed() || seen.span_ds() >= enough_ds; });
 }
@@ -99,9 +101,10 @@ std::vector<MapPoint> GlobalMap::points() const {
 void GlobalMap::State::postpone(const Frame& frame, Postponed& out) {
     out.points.clear();
     out.cleared.clear();
-    out.stamp_ns = frame.header.stamp_ns;
-    if (first_stamp_ns == 0) first_stamp_ns = out.stamp_ns;
-    last_stamp_ns = out.stamp_ns;
+    if (last_stamp_ns != 0)
+        time_ns += std::clamp<std::int64_t>(frame.header.stamp_ns - last_stamp_ns, 0, kLongestTurn_ns);
+    last_stamp_ns = frame.header.stamp_ns;
+    out.time_ns = time_ns;
     if (!frame.odometry.valid) return;
     position_m = frame.odometry.T_world_sensor.translation();
     out.cleared.assign(frame.detection.cleared.begin(), frame.detection.cleared.end());
@@ -128,8 +131,8 @@ void GlobalMap::State::postpone(const Frame& frame, Postponed& out) {
 
 void GlobalMap::State::enter(Postponed& postponed) {
     const auto& points = postponed.points;
-    if (postponed.stamp_ns != 0) entered_stamp_ns = postponed.stamp_ns;
-    const std::uint16_t now_ds = deciseconds(postponed.stamp_ns);
+    entered_time_ns = postponed.time_ns;
+    const std::uint16_t now_ds = deciseconds(postponed.time_ns);
     for (std::size_t i = 0; i < points.size(); ++i) {
         if (i + kPrefetch < points.size()) cells.prefetch(points[i + kPrefetch]);
         cells.insert(points[i], now_ds);
@@ -165,10 +168,9 @@ void GlobalMap::State::clear_some(std::size_t budget) {
 
 // A part of the table a frame: what was seen for a moment only does not fill the memory.
 void GlobalMap::State::sweep_unconfirmed() {
-    if (entered_stamp_ns == 0) return;
-    const std::uint16_t now_ds = deciseconds(last_stamp_ns);
+    const std::uint16_t now_ds = deciseconds(time_ns);
     // Points wait before they enter: what is being seen now is not forgotten meanwhile.
-    const auto stale_ds = static_cast<std::uint16_t>(rule.gap_ds + deciseconds(last_stamp_ns - entered_stamp_ns));
+    const auto stale_ds = static_cast<std::uint16_t>(rule.gap_ds + deciseconds(time_ns - entered_time_ns));
     for (std::size_t i = 0; i < kSweptSlotsAFrame; ++i) {
         if (++sweep_slot >= cells.slots()) sweep_slot = 0;
         const MapPoint* p = cells.at(sweep_slot);

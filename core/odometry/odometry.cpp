@@ -36,6 +36,8 @@ constexpr double kMaxPrediction_s = 1.0;
 constexpr double kMaxDeviation_m = 0.3;
 // After so long without a registration the map is given up.
 constexpr double kLost_s = 2.0;
+// Without a scan for longer than this there is no prediction worth the name.
+constexpr double kMaxGap_s = 5.0;
 constexpr double kStandardGravity_mps2 = 9.80665;
 
 bool converged(const MotionFilter::Step& step) {
@@ -69,6 +71,7 @@ struct Odometry::State {
                       const Eigen::Isometry3d& T_world_sensor);
     void see_turn(std::int64_t stamp_ns);
     void write_result(Frame& frame);
+    static void write_nothing(Frame& frame);
     Eigen::Vector3d mean_force(const Frame& frame) const;
     double median_range(const PointSelection& points);
 
@@ -96,6 +99,7 @@ struct Odometry::State {
     // Of the present frame.
     std::uint32_t flags = 0;
     bool registered = false;
+    bool trusted = true;  ///< false: what this frame gives is not to be used
     SweepMotion motion;
     PlacedPoints placed;  ///< the frame's points after that motion
     VoxelIndex origin;
@@ -130,18 +134,28 @@ Odometry::State::State(const SensorModel& sensor_model, const OdometryConfig& co
 
 void Odometry::State::process(Frame& frame, const OdometryFeedback* feedback) {
     if (feedback != nullptr) apply(*feedback);
+    if (frame.header.valid_columns == 0) {
+        // Such a frame has no time of its own: nothing is to be learnt from it, and nothing to be predicted for it.
+        write_nothing(frame);
+        return;
+    }
     const int taken = config.use_imu ? imu.add(frame.imu) : 0;
     monitor.see_samples(frame.imu, taken, imu.newest_ns(), frame.header.stamp_ns);
     excluded.assign(frame.prepared.points.size(), 0);
     flags = 0;
     iterations = 0;
     registered = false;
+    trusted = true;
     const bool goes_back = started && frame.header.stamp_ns <= filter.stamp_ns();
     const bool lost = started && static_cast<double>(frame.header.stamp_ns - last_registered_ns) * 1e-9 > kLost_s;
     if (!started) {
         if (frame.header.usable) start(frame, Eigen::Isometry3d::Identity());
     } else if (goes_back) {
         restart(frame);
+    } else if (static_cast<double>(frame.header.stamp_ns - filter.stamp_ns()) * 1e-9 > kMaxGap_s) {
+        // The sensor was away, or its clock has jumped: whatever a prediction over such a time gave would be invented.
+        restart(frame);
+        trusted = false;
     } else {
         choose_motion_model(frame);
         const MotionFilter before = filter;
@@ -154,7 +168,7 @@ void Odometry::State::process(Frame& frame, const OdometryFeedback* feedback) {
         if (!registered && lost && frame.header.usable) restart(frame);
     }
     if (!started) {
-        frame.odometry.valid = false;
+        write_nothing(frame);
         return;
     }
     update_sweep(frame);
@@ -291,7 +305,8 @@ void Odometry::State::start(const Frame& frame, const Eigen::Isometry3d& T_world
 void Odometry::State::restart(const Frame& frame) {
     flags |= OdometryResult::kReinitialized;
     keyframes.clear();
-    if (frame.header.stamp_ns <= filter.stamp_ns()) {
+    if (frame.header.stamp_ns <= filter.stamp_ns() ||
+        static_cast<double>(frame.header.stamp_ns - filter.stamp_ns()) * 1e-9 > kMaxGap_s) {
         imu.clear();
         imu.add(frame.imu);
     }
@@ -427,8 +442,8 @@ void Odometry::State::write_result(Frame& frame) {
     out.correspondences = static_cast<int>(registered ? matches.count : 0);
     out.flags = flags | (filter.uses_imu() ? OdometryResult::kImuUsed : 0U) |
                 (registered ? 0U : OdometryResult::kPredictedOnly);
-    out.valid = registered || (since_registered < kMaxPrediction_s &&
-                               std::sqrt(out.covariance.diagonal().head<3>().sum()) < kMaxDeviation_m);
+    out.valid = trusted && (registered || (since_registered < kMaxPrediction_s &&
+                                           std::sqrt(out.covariance.diagonal().head<3>().sum()) < kMaxDeviation_m));
     deskew(sensor, motion, frame);
     scan_to_submap.residuals(frame.prepared.points, placed, keyframes.submap(), origin, out.residual_pixel,
                              out.residual_m);
@@ -436,6 +451,18 @@ void Odometry::State::write_result(Frame& frame) {
     out.keyframe =
         registered && !bootstrapping && keyframes.is_due(out.T_world_sensor, median_range(frame.prepared.points));
     if (out.keyframe) keyframes.announce(out.T_world_sensor, out.covariance);
+}
+
+void Odometry::State::write_nothing(Frame& frame) {
+    OdometryResult& out = frame.odometry;
+    out.valid = false;
+    out.keyframe = false;
+    out.flags = OdometryResult::kPredictedOnly;
+    out.iterations = 0;
+    out.correspondences = 0;
+    out.residual_pixel.clear();
+    out.residual_m.clear();
+    for (auto* image : {&out.x, &out.y, &out.z}) image->fill(0.0F);
 }
 
 /// Spaciousness: median range of the selected points, smoothed over the frames.

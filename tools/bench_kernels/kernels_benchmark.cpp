@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/preprocess/subsampling.hpp"
+#include "core/registration/placed_points.hpp"
 #include "core/registration/scan_to_submap.hpp"
 #include "core/segmentation/ground_removal.hpp"
 #include "core/segmentation/range_image_segmentation.hpp"
@@ -138,9 +139,11 @@ void registration_step(benchmark::State& state) {
     PlaneMatches matches;
     matches.reserve(points.size());
     NormalEquations equations;
+    PlacedPoints placed;
     for (auto _ : state) {
         matches.clear();
-        kernel.match(points, excluded, standing, map, VoxelIndex{}, 1.0, matches);
+        place(points, standing, placed);
+        kernel.match(points, excluded, placed, map, VoxelIndex{}, 1.0, matches);
         accumulate(matches, equations);
     }
     state.counters["matches"] = static_cast<double>(equations.count);
