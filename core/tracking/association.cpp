@@ -69,8 +69,10 @@ const std::vector<int>& Association::solve(std::span<const ExpectedTrack> tracks
             const ExpectedTrack& track = tracks[t];
             const CandidateDetection& detection = detections[d];
             if (gated_distance(track, detection, config) > 1.0) continue;
-            const double c = cost(track.visible, track.points, detection.visible, detection.points, config) +
-                             contradiction(track, detection, config);
+            // A box that fits is the object, whatever its evidence says of this frame.
+            const double c =
+                cost(track.visible, track.points, detection.visible, detection.points, config) +
+                contradiction(track, detection, config) * (1.0 - box_iou(track.visible, detection.visible));
             if (c < std::min(config.unmatched_cost, config.alpha))
                 pairs_.push_back({static_cast<int>(t), static_cast<int>(d), c});
         }

@@ -13,12 +13,14 @@ constexpr double kFewTested = 40.0;       // points: with more, a smaller share 
 constexpr double kLeastNeutral = 0.3;     // this part of free_fraction
 constexpr double kTall_m = 0.4;           // detections of that height count in full
 constexpr double kMostUnconfirmed = 0.6;  // of what makes an object dynamic, without free space
-constexpr double kUnconfirmed = 0.3;      // trust in a displacement where no free space was tested
-constexpr double kMaxLogOdds = 8.0;       // bounds keep a belief reversible
-constexpr double kMaxStep = 2.4;          // one frame alone never decides
-constexpr double kAway_m = 0.15;          // from the mean place of rest
-constexpr double kRestMean = 0.1;         // weight of a new position in that mean
-constexpr int kAwayDetections = 2;        // in a row off the place of rest: it has set off
+// What walks away hides the space that it enters: nobody can have seen it free, and its old places look occupied.
+constexpr double kSustained = 0.7;    // least trust in a displacement that agrees with the track's velocity for a while
+constexpr double kUnconfirmed = 0.3;  // trust in a displacement where no free space was tested
+constexpr double kMaxLogOdds = 8.0;   // bounds keep a belief reversible
+constexpr double kMaxStep = 2.4;      // one frame alone never decides
+constexpr double kAway_m = 0.15;      // from the mean place of rest
+constexpr double kRestMean = 0.1;     // weight of a new position in that mean
+constexpr int kAwayDetections = 2;    // in a row off the place of rest: it has set off
 
 }  // namespace
 
@@ -45,10 +47,12 @@ double motion_log_odds(const MotionCues& cues, const DynamicStateConfig& config)
             const double neutral =
                 config.free_fraction * std::clamp(std::sqrt(kFewTested / tested), kLeastNeutral, 1.0);
             const double excess = std::clamp(share / neutral - 1.0, -1.0, 2.0);
-            sum += config.free_weight * excess * known * tall * tested / (tested + kPatience);
+            const double term = config.free_weight * excess * known * tall * tested / (tested + kPatience);
+            sum += cues.sustained_displacement ? std::max(0.0, term) : term;
             trust = known * std::min(1.0, share / neutral);
         }
     }
+    if (cues.sustained_displacement) trust = std::max(trust, kSustained);
     if (config.use_residual && cues.residual_points > 0 && cues.height_m > 0.0) {
         const double ratio = cues.average_residual_m / std::max(1e-3, config.theta_res * cues.height_m);
         const double excess = std::clamp(ratio - 1.0, -1.0, 2.0);
@@ -96,7 +100,7 @@ void MotionBelief::rest(const MotionCues& cues, const DynamicStateConfig& config
 DynamicState MotionBelief::fused(const MotionCues& cues, const DynamicStateConfig& config) {
     double step = motion_log_odds(cues, config);
     // What comes into view where nothing was ever seen differs from the map, too: that makes it a suspect, no more.
-    if (config.use_free_space && free_share(cues) < 0.0) {
+    if (config.use_free_space && free_share(cues) < 0.0 && !cues.sustained_displacement) {
         step = std::min(step, std::max(0.0, kMostUnconfirmed * config.dynamic_log_odds - log_odds_));
     }
     log_odds_ = std::clamp(log_odds_ + step, config.static_log_odds - 0.5, kMaxLogOdds);

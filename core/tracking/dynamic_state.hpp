@@ -18,8 +18,9 @@ struct MotionCues {
     int free_points = 0;      ///< pixels where earlier frames saw free space
     int occupied_points = 0;  ///< pixels where they saw a surface
     int unknown_points = 0;
-    double shift_m = 0.0;                ///< of the box centre from the track's first position, ground plane
-    double displacement_log_odds = 0.0;  ///< of "moved" against "stayed", from the registration of its own points
+    double shift_m = 0.0;                 ///< of the box centre from the track's first position, ground plane
+    double displacement_log_odds = 0.0;   ///< of "moved" against "stayed", from the registration of its own points
+    bool sustained_displacement = false;  ///< it has agreed with the filtered velocity for a while
     Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< filtered centre, ground plane
     double dt_s = 0.0;                                     ///< since the detection before
 };

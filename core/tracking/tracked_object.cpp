@@ -15,8 +15,11 @@ constexpr int kEstablishedHits = 5;        // detections before its prediction i
 constexpr int kBlindFrames = 2;            // a prediction is published where nothing is seen
 constexpr double kHeadingSpeed_mps = 0.7;  // slower objects may move sideways
 constexpr double kElongated = 1.6;         // a principal axis says where an object points
-constexpr double kStale_s = 2.0;           // older ones show another side
-constexpr double kReference_s = 0.45;      // points to register to are renewed that often
+constexpr double kAgreeing_m = 0.3;        // a shorter displacement may be noise
+constexpr double kAgreement = 0.4;         // of its length, from what the velocity predicts
+constexpr int kAgreeingFrames = 4;
+constexpr double kStale_s = 2.0;       // older ones show another side
+constexpr double kReference_s = 0.45;  // points to register to are renewed that often
 
 const DetectionShape& largest_shape(const DetectionShapes& shapes, const Sighting& sighting) {
     return shapes[sighting.detections.front()];
@@ -125,8 +128,7 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
     cues.shift_m = (filter_.box().center_m - origin_m_).head<2>().norm();
     cues.dt_s = unseen_s_;
     cues.position_m = filter_.box().center_m.head<2>();
-    if (config.state.use_displacement && !clear_without_displacement(cues))
-        cues.displacement_log_odds = displacement_cue(frame, sighting);
+    if (config.state.use_displacement && !clear_without_displacement(cues)) displacement_cue(frame, sighting, cues);
 
     ++hits_;
     misses_ = 0;
@@ -166,17 +168,18 @@ bool TrackedObject::dead(const TrackingConfig& config) const {
 
 bool TrackedObject::clear_without_displacement(const MotionCues& cues) const {
     const double share = free_share(cues);
-    if (share < 0.0 || hits_ == 0) return false;
+    if (share < 0.0 || hits_ == 0 || agreeing_ > 0) return false;
+    if (filter_.speed() > kHeadingSpeed_mps && filter_.speed() > 2.0 * filter_.velocity_sd())
+        return belief_.state() == DynamicState::kDynamic && share > 0.3;
     if (belief_.state() == DynamicState::kDynamic) return share > 0.3;
     return belief_.state() == DynamicState::kStatic && share < 0.05;
 }
 
-double TrackedObject::displacement_cue(const Frame& frame, const Sighting& sighting) {
+void TrackedObject::displacement_cue(const Frame& frame, const Sighting& sighting, MotionCues& cues) {
     PointSample now;
     const Detection& part = frame.detection.detections[sighting.detections.front()];
     sample_points(frame, std::span(frame.detection.pixels).subspan(part.first, part.count), now);
     const Eigen::Vector2d center = filter_.box().center_m.head<2>();
-    double log_odds = 0.0;
     if (hits_ == 0) {
         before_ = since_ = now;
         before_center_m_ = since_center_m_ = center;
@@ -186,7 +189,12 @@ double TrackedObject::displacement_cue(const Frame& frame, const Sighting& sight
         before_center_m_ = since_center_m_ = center;
     } else {
         const auto r = register_displacement(before_, now, center - before_center_m_);
-        log_odds = displacement_log_odds(r, before_.age_s);
+        cues.displacement_log_odds = displacement_log_odds(r, before_.age_s);
+        const Eigen::Vector2d expected = before_.age_s * filter_.velocity().head<2>();
+        const bool agrees = cues.displacement_log_odds > 0.0 && r.displacement_m.norm() > kAgreeing_m &&
+                            (r.displacement_m - expected).norm() < kAgreement * r.displacement_m.norm();
+        agreeing_ = agrees ? agreeing_ + 1 : 0;
+        cues.sustained_displacement = agreeing_ >= kAgreeingFrames;
     }
     if (since_.age_s > kReference_s) {
         before_ = since_;
@@ -194,7 +202,6 @@ double TrackedObject::displacement_cue(const Frame& frame, const Sighting& sight
         since_ = now;
         since_center_m_ = center;
     }
-    return log_odds;
 }
 
 ExpectedTrack TrackedObject::expected() const {

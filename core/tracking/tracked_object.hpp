@@ -57,7 +57,7 @@ class TrackedObject {
     std::pair<double, double> measured_yaw(const PrincipalAxis& axis);
     bool clear_without_displacement(const MotionCues& cues) const;
     /// Registers this frame's points to earlier ones, and renews those.
-    double displacement_cue(const Frame& frame, const Sighting& sighting);
+    void displacement_cue(const Frame& frame, const Sighting& sighting, MotionCues& cues);
     /// Visible box of all parts at one yaw.
     static OrientedBox visible_box(const Frame& frame, const DetectionShapes& shapes, const Sighting& sighting,
                                    double yaw_rad);
@@ -71,6 +71,7 @@ class TrackedObject {
     PointSample before_;  ///< points of half a second to a second ago, or of the first sighting
     PointSample since_;   ///< those that follow them
     Eigen::Vector2d before_center_m_ = Eigen::Vector2d::Zero(), since_center_m_ = Eigen::Vector2d::Zero();
+    int agreeing_ = 0;  ///< frames in a row in which registered displacement and filtered velocity agreed
     double unseen_s_ = 0.0;
     double residual_m_ = 0.0;
     int points_ = 0;  ///< of the last sighting

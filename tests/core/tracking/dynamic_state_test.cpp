@@ -113,6 +113,23 @@ TEST(DynamicState, ADisplacementCountsAsFarAsFreeSpaceBearsItOut) {
     EXPECT_NEAR(motion_log_odds(borne_out, config), before + 1.5, 1e-12);
 }
 
+// Who walks away enters space that he hides, and his old places look occupied: a displacement that agrees with the
+// track's velocity for a while decides all the same; one that does not, never.
+TEST(DynamicState, WhatWalksAwayIsFoundByItsSustainedDisplacement) {
+    const DynamicStateConfig config;
+    for (const bool sustained : {false, true}) {
+        MotionBelief belief;
+        for (int n = 0; n < 12; ++n) {
+            MotionCues cues = free_cue(0, n < 4 ? 0 : 30);
+            cues.unknown_points = 40;
+            cues.displacement_log_odds = 1.5;
+            cues.sustained_displacement = sustained && n >= 5;
+            belief.update(cues, config);
+        }
+        EXPECT_EQ(belief.state(), sustained ? DynamicState::kDynamic : DynamicState::kStatic);
+    }
+}
+
 TEST(DynamicState, AMistakeIsTakenBack) {
     const DynamicStateConfig config;
     MotionBelief belief;
