@@ -96,6 +96,13 @@ void Ingest::charge_clocks() {
 
 void Ingest::log_warnings() {
     for (const auto& warning : source_.take_warnings()) spdlog::warn("{}", warning);
+    if (const std::uint64_t serial = builder_.foreign_serial(); serial != 0 && !foreign_warned_) {
+        foreign_warned_ = true;
+        spdlog::warn(
+            "packets of the sensor with serial number {} are not used: the metadata are those of another sensor; "
+            "to use it, give its metadata",
+            serial);
+    }
 }
 
 }  // namespace dlod::daemon

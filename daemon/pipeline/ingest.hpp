@@ -71,6 +71,7 @@ class Ingest final : public Actor {
     driver::FrameBuilder builder_;
     driver::PacketBatch batch_;
     std::size_t next_packet_ = 0;
+    bool foreign_warned_ = false;
     StageTimes times_;
     std::int64_t wall_start_ns_ = 0;
     std::int64_t cpu_start_ns_ = 0;
