@@ -23,7 +23,7 @@ struct Loss {
 constexpr Loss kLosses[] = {
     {"pipeline_dropped_frames", "the CPU is too slow: give the service more CPU or threads"},
     {"dropped_frames", "the CPU is too slow: give the service more CPU or threads"},
-    {"kernel_drops", "raise net.core.rmem_max and sensor.receive_buffer_bytes"},
+    {"packets_kernel_drops", "raise net.core.rmem_max and sensor.receive_buffer_bytes"},
     {"lost_packets", "check cable, switch and receive buffer"},
     {"unusable_frames", "too few columns arrive: check the network"},
     {"wrong_size_packets", "the sensor's profile is not that of the metadata"},

@@ -1,25 +1,14 @@
-// The whole program, live: packets over UDP, messages over LCM's multicast, counted by a real subscriber.
-#include <arpa/inet.h>
+// The whole program, live, at a sensor's full size and rate: packets by UDP from the simulator in a process of its own,
+// messages over LCM's multicast, counted by a real subscriber.
 #include <gtest/gtest.h>
-#include <poll.h>
-#include <sys/socket.h>
-#include <sys/un.h>
-#include <unistd.h>
 
-#include <atomic>
 #include <chrono>
 #include <csignal>
-#include <dlod/dynamic_mask_t.hpp>
-#include <dlod/pose_t.hpp>
-#include <dlod/status_t.hpp>
-#include <dlod/tracks_t.hpp>
 #include <fstream>
-#include <lcm/lcm-cpp.hpp>
-#include <map>
-#include <string>
-#include <thread>
 
 #include "tests/support/child_process.hpp"
+#include "tests/support/live_subscriber.hpp"
+#include "tests/support/notify_socket.hpp"
 #include "tests/support/synthetic_capture.hpp"
 
 namespace dlod {
@@ -27,161 +16,80 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr int kFrames = 40;
-/// A port of its own: LCM hears every multicast group on its port.
+constexpr std::size_t kFrames = 40;
 constexpr const char* kUrl = "udpm://239.255.76.99:17667?ttl=0";
-
-/// Counts what planners would see.
-class Subscriber {
-  public:
-    Subscriber() : lcm_(kUrl) {
-        if (!lcm_.good()) return;
-        lcm_.subscribe("TEST_POSE", &Subscriber::on_pose, this);
-        lcm_.subscribe("TEST_MASK", &Subscriber::on_mask, this);
-        lcm_.subscribe("TEST_TRACKS", &Subscriber::on_tracks, this);
-        lcm_.subscribe("TEST_STATUS", &Subscriber::on_status, this);
-        thread_ = std::thread([this] {
-            while (!stop_) lcm_.handleTimeout(50);
-        });
-    }
-    ~Subscriber() { stop(); }
-    void stop() {
-        stop_ = true;
-        if (thread_.joinable()) thread_.join();
-    }
-    bool good() const { return lcm_.good(); }
-
-    // To be read after stop().
-    std::map<std::int64_t, pose_t> poses;
-    std::map<std::int64_t, std::int64_t> mask_utimes;
-    std::map<std::int64_t, std::int64_t> track_utimes;
-    std::vector<status_t> statuses;
-
-  private:
-    void on_pose(const lcm::ReceiveBuffer*, const std::string&, const pose_t* m) { poses[m->sequence] = *m; }
-    void on_mask(const lcm::ReceiveBuffer*, const std::string&, const dynamic_mask_t* m) {
-        mask_utimes[m->sequence] = m->utime;
-    }
-    void on_tracks(const lcm::ReceiveBuffer*, const std::string&, const tracks_t* m) {
-        track_utimes[m->sequence] = m->utime;
-    }
-    void on_status(const lcm::ReceiveBuffer*, const std::string&, const status_t* m) { statuses.push_back(*m); }
-
-    lcm::LCM lcm_;
-    std::atomic<bool> stop_{false};
-    std::thread thread_;
-};
-
-/// Stands in for systemd: collects what the service tells.
-class NotifySocket {
-  public:
-    explicit NotifySocket(const std::filesystem::path& folder) : path_((folder / "notify").string()) {
-        socket_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-        sockaddr_un address{};
-        address.sun_family = AF_UNIX;
-        path_.copy(address.sun_path, sizeof(address.sun_path) - 1);
-        if (::bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0)
-            ADD_FAILURE() << "bind " << path_;
-    }
-    ~NotifySocket() { ::close(socket_); }
-    const std::string& path() const { return path_; }
-    const std::string& messages() {
-        char buffer[2048];
-        for (ssize_t n = 0; (n = ::recv(socket_, buffer, sizeof(buffer), MSG_DONTWAIT)) > 0;) {
-            messages_.append(buffer, static_cast<std::size_t>(n)) += '\n';
-        }
-        return messages_;
-    }
-    bool wait_for(const std::string& text, std::chrono::milliseconds timeout) {
-        const auto deadline = std::chrono::steady_clock::now() + timeout;
-        while (messages().find(text) == std::string::npos) {
-            if (std::chrono::steady_clock::now() > deadline) return false;
-            pollfd watched{socket_, POLLIN, 0};
-            ::poll(&watched, 1, 20);
-        }
-        return true;
-    }
-
-  private:
-    std::string path_;
-    int socket_;
-    std::string messages_;
-};
-
-/// Sends the drive's packets to loopback, each when it is due.
-void send_at_true_rate(const test::SyntheticCapture& capture) {
-    const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    ASSERT_GE(socket, 0);
-    const auto start = std::chrono::steady_clock::now();
-    for (const auto& packet : capture.packets()) {
-        std::this_thread::sleep_until(start +
-                                      std::chrono::nanoseconds(packet.time_ns - capture.packets().front().time_ns));
-        sockaddr_in to{};
-        to.sin_family = AF_INET;
-        to.sin_port = htons(packet.port);
-        to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-        ASSERT_EQ(::sendto(socket, packet.data.data(), packet.data.size(), 0, reinterpret_cast<const sockaddr*>(&to),
-                           sizeof(to)),
-                  static_cast<ssize_t>(packet.data.size()));
-    }
-    ::close(socket);
-}
+constexpr const char* kPort = "17502";  // and the next one for the IMU
 
 TEST(Live, NoFrameIsLostFromPacketToSubscriber) {
+#ifndef DLOD_SIM_BINARY
+    GTEST_SKIP() << "the simulator is not built";
+#else
     const test::TemporaryFolder folder;
     if (!test::enter_network_namespace()) GTEST_LOG_(INFO) << "no namespace of its own: on the host's loopback";
-    Subscriber subscriber;
+    const test::LiveSubscriber subscriber(kUrl, "TEST_");
     if (!subscriber.good()) GTEST_SKIP() << "no multicast here";
-    NotifySocket systemd(folder.path());
-    const test::SyntheticCapture capture(kFrames);
-    std::ofstream(folder.path() / "sensor.json") << test::SyntheticCapture::metadata();
+    test::NotifySocket systemd(folder.path());
+    // A drive of one frame, for the sensor's metadata.
+    test::ChildProcess sensor({DLOD_SIM_BINARY, "square", "--frames", "1", "--out", folder.path()});
+    ASSERT_EQ(sensor.wait(30s), 0) << sensor.output();
     std::ofstream(folder.path() / "dlod.yaml")
-        << "sensor: {metadata: " << (folder.path() / "sensor.json").string() << "}\n"
+        << "sensor: {metadata: " << (folder.path() / "square.json").string() << ", lidar_port: 17502, imu_port: 17503, "
+        << "sender: 127.0.0.1}\n"
         << "lcm: {channel_prefix: TEST_, url: \"" << kUrl << "\"}\n";
     test::ChildProcess daemon(
         {DLOD_BINARY, "run", "-c", (folder.path() / "dlod.yaml").string(), "--out", (folder.path() / "out").string()},
-        {.environment = {"NOTIFY_SOCKET=" + systemd.path()}, .largest_file = {}});
+        {.environment = {systemd.variable()}, .largest_file = {}});
     ASSERT_TRUE(systemd.wait_for("READY=1", 10s)) << daemon.output();
 
-    const auto wall_start = std::chrono::system_clock::now();
-    send_at_true_rate(capture);
-    std::this_thread::sleep_for(500ms);
+    test::ChildProcess simulator(
+        {DLOD_SIM_BINARY, "square", "--frames", std::to_string(kFrames), "--live", std::string("127.0.0.1:") + kPort});
+    ASSERT_EQ(simulator.wait(120s), 0) << simulator.output();
+    const auto sent = std::chrono::system_clock::now();
+    EXPECT_TRUE(test::LiveSubscriber::wait_until(5s, [&] { return subscriber.pose_count() >= kFrames; }));
     EXPECT_TRUE(systemd.wait_for("WATCHDOG=1", 2s)) << "the watchdog is fed while frames flow";
-    daemon.signal(SIGHUP);
-    EXPECT_TRUE(systemd.wait_for("RELOADING=1", 2s));
+    systemd.clear();
+    EXPECT_TRUE(systemd.wait_for("STATUS=", 2s)) << "a report that has counted all frames";
     daemon.signal(SIGTERM);
     EXPECT_EQ(daemon.wait(2s), 0) << "a clean stop within two seconds\n" << daemon.output();
     EXPECT_TRUE(systemd.wait_for("STOPPING=1", 1s));
-    subscriber.stop();
 
-    ASSERT_EQ(subscriber.poses.size(), static_cast<std::size_t>(kFrames)) << daemon.output();
-    EXPECT_EQ(subscriber.mask_utimes.size(), static_cast<std::size_t>(kFrames));
-    EXPECT_EQ(subscriber.track_utimes.size(), static_cast<std::size_t>(kFrames));
-    const std::int64_t begin =
-        std::chrono::duration_cast<std::chrono::microseconds>(wall_start.time_since_epoch()).count();
-    std::int64_t last_utime = 0;
-    for (const auto& [sequence, pose] : subscriber.poses) {
-        EXPECT_EQ(subscriber.mask_utimes.at(sequence), pose.utime);
-        EXPECT_EQ(subscriber.track_utimes.at(sequence), pose.utime);
-        EXPECT_GT(pose.utime, last_utime);
-        last_utime = pose.utime;
-        // The sensor's clock has nothing to do with the host's: utime is host time all the same.
-        EXPECT_NEAR(1e-6 * static_cast<double>(pose.utime - begin), 0.1 * static_cast<double>(sequence + 1), 0.09);
+    const auto poses = subscriber.poses();
+    const auto masks = subscriber.masks();
+    const auto tracks = subscriber.tracks();
+    ASSERT_EQ(poses.size(), kFrames) << daemon.output();
+    ASSERT_EQ(masks.size(), kFrames);
+    ASSERT_EQ(tracks.size(), kFrames);
+    const std::int64_t end = std::chrono::duration_cast<std::chrono::microseconds>(sent.time_since_epoch()).count();
+    for (std::size_t i = 0; i < kFrames; ++i) {
+        const auto sequence = static_cast<std::int64_t>(i);
+        EXPECT_EQ(poses[i].sequence, sequence);
+        EXPECT_EQ(masks.at(sequence), poses[i].utime);
+        EXPECT_EQ(tracks.at(sequence), poses[i].utime);
+        EXPECT_NE(poses[i].flags & pose_t::VALID, 0) << "frame " << i;
+        // The simulated sensor's clock has nothing to do with the host's: utime is host time all the same.
+        EXPECT_NEAR(1e-6 * static_cast<double>(poses[i].utime - end), 0.1 * (static_cast<double>(i + 1) - kFrames), 0.2)
+            << "frame " << i;
+        if (i == 0) continue;
+        EXPECT_GT(poses[i].utime, poses[i - 1].utime);
     }
-    EXPECT_NE(subscriber.poses.rbegin()->second.flags & pose_t::VALID, 0);
 
-    ASSERT_GE(subscriber.statuses.size(), 3U);
-    const auto& status = subscriber.statuses.back();
-    EXPECT_NEAR(subscriber.statuses[2].frame_rate, 10.0, 2.5);
-    EXPECT_NE(status.sensor.find("123456"), std::string::npos);
+    const auto statuses = subscriber.statuses();
+    ASSERT_GE(statuses.size(), 3U);
+    const auto& status = statuses.back();
+    EXPECT_NE(status.sensor.find("RNG15_RFL8_NIR8"), std::string::npos);
     EXPECT_GT(status.memory, 0);
-    std::map<std::string, std::int64_t> counters;
-    for (std::size_t i = 0; i < status.counter_name.size(); ++i)
-        counters[status.counter_name[i]] = status.counter_value[i];
-    EXPECT_EQ(counters.at("frames"), kFrames);
-    EXPECT_EQ(counters.at("pipeline_dropped_frames"), 0);
-    EXPECT_EQ(counters.at("lcm_failed"), 0);
+    EXPECT_EQ(test::counter(status, "frames"), static_cast<std::int64_t>(kFrames));
+    EXPECT_EQ(test::counter(status, "lidar_packets"), static_cast<std::int64_t>(kFrames * 64));
+    for (const char* loss : {"lost_packets", "packets_kernel_drops", "incomplete_frames", "dropped_frames",
+                             "pipeline_dropped_frames", "lcm_failed", "output_failures"}) {
+        EXPECT_EQ(test::counter(status, loss), 0) << loss;
+    }
     EXPECT_TRUE(std::filesystem::exists(folder.path() / "out" / "map.pcd")) << "all outputs are complete";
+    ASSERT_EQ(status.stage_name.back(), "latency");
+    GTEST_LOG_(INFO) << "latency from the last packet's kernel stamp to the message, ms: p50 "
+                     << status.stage_p50.back() << ", p99 " << status.stage_p99.back() << ", max "
+                     << status.stage_max.back();
+#endif
 }
 
 }  // namespace

@@ -58,14 +58,15 @@ TEST_F(StatusBoardTest, HealthSaysWhatIsWrongAndWhatToDo) {
     EXPECT_NE(board_.one_line().find("no packets"), std::string::npos) << board_.one_line();
     pose_at(3.0);
     EXPECT_EQ(at(3.0, {}, 3.0).health, status_t::OK);
-    EXPECT_EQ(at(4.0, {{"kernel_drops", 5}}, 4.0).health, status_t::DEGRADED);
+    EXPECT_EQ(at(4.0, {{"packets_kernel_drops", 5}}, 4.0).health, status_t::DEGRADED);
     EXPECT_NE(board_.one_line().find("net.core.rmem_max"), std::string::npos) << board_.one_line();
     for (int second = 5; second < 14; ++second) pose_at(second);
-    EXPECT_EQ(at(13.5, {{"kernel_drops", 5}}, 13.5).health, status_t::DEGRADED) << "remembered for ten seconds";
+    EXPECT_EQ(at(13.5, {{"packets_kernel_drops", 5}}, 13.5).health, status_t::DEGRADED) << "remembered for ten seconds";
     pose_at(15.0);
-    EXPECT_EQ(at(15.0, {{"kernel_drops", 5}}, 15.0).health, status_t::OK);
-    EXPECT_EQ(at(20.0, {{"kernel_drops", 5}}, 20.0).health, status_t::FAULT) << "packets, but no pose for five seconds";
-    EXPECT_EQ(at(30.0, {{"kernel_drops", 5}}, 20.0).health, status_t::WAITING);
+    EXPECT_EQ(at(15.0, {{"packets_kernel_drops", 5}}, 15.0).health, status_t::OK);
+    EXPECT_EQ(at(20.0, {{"packets_kernel_drops", 5}}, 20.0).health, status_t::FAULT)
+        << "packets, but no pose for five seconds";
+    EXPECT_EQ(at(30.0, {{"packets_kernel_drops", 5}}, 20.0).health, status_t::WAITING);
 }
 
 }  // namespace
