@@ -1,0 +1,303 @@
+#include "core/preprocess/plane_windows.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "tests/support/simulated_drive.hpp"
+
+namespace dlod::test {
+namespace {
+
+/// @param beam_origin_m windows know one origin for all their beams: 0 makes that exact
+SensorModel staggered_sensor(int height, int width, float beam_origin_m = 0.0F) {
+    DriveOptions options;
+    options.height = height;
+    options.width = width;
+    SensorModel sensor = SimulatedDrive(
+                             {}, [](double) { return Eigen::Isometry3d::Identity(); }, options)
+                             .sensor();
+    sensor.beam_origin_m = beam_origin_m;
+    return sensor;
+}
+
+struct Beam {
+    Eigen::Vector3d origin, direction;  ///< sensor frame
+};
+
+/// Origin and direction of a pixel's beam after the sensor's documented geometry.
+Beam beam_of(const SensorModel& sensor, int row, int column) {
+    const auto r = static_cast<std::size_t>(row);
+    const double theta = 2.0 * std::numbers::pi * (1.0 - sensor.measurement_of(row, column) / double(sensor.width));
+    const double azimuth = theta - static_cast<double>(sensor.azimuth_offset_rad[r]);
+    const double altitude = static_cast<double>(sensor.altitude_rad[r]);
+    const double n = static_cast<double>(sensor.beam_origin_m);
+    return {
+        sensor.T_sensor_lidar * Eigen::Vector3d(n * std::cos(theta), n * std::sin(theta), 0.0),
+        sensor.T_sensor_lidar.linear() * Eigen::Vector3d(std::cos(azimuth) * std::cos(altitude),
+                                                         std::sin(azimuth) * std::cos(altitude), std::sin(altitude))};
+}
+
+/// Ranges to the plane normal . p = offset, with noise; 0 where the beam does not meet it within 60 m.
+void shoot_at_plane(const SensorModel& sensor, const Eigen::Vector3d& normal, double offset, double noise_m,
+                    Frame& frame) {
+    std::mt19937_64 random(7);
+    std::normal_distribution<double> gauss;
+    for (int r = 0; r < sensor.height; ++r) {
+        for (int c = 0; c < sensor.width; ++c) {
+            const Beam beam = beam_of(sensor, r, c);
+            const double along = normal.dot(beam.direction);
+            const double range = along > 1e-3 ? (offset - normal.dot(beam.origin)) / along : 0.0;
+            const bool hit = range > 0.3 && range < 60.0;
+            const double measured =
+                range + static_cast<double>(sensor.beam_origin_m) + (hit ? noise_m * gauss(random) : 0.0);
+            frame.raw.range_mm(r, c) = hit ? static_cast<std::uint32_t>(std::lround(measured * 1000.0)) : 0U;
+        }
+    }
+}
+
+Eigen::Vector3d point_of(const SensorModel& sensor, const Frame& frame, int row, int column) {
+    const Beam beam = beam_of(sensor, row, column);
+    return beam.origin +
+           (frame.raw.range_mm(row, column) * 1e-3 - static_cast<double>(sensor.beam_origin_m)) * beam.direction;
+}
+
+struct Window {
+    Eigen::Vector3d normal;  ///< towards the sensor
+    double deviation_m;      ///< of the ranges along the beams
+    double range_m;          ///< where the middle beam meets the plane, from its origin
+};
+
+/// Eigen-decomposition of the covariance of the same 25 points.
+Window slow_window(const SensorModel& sensor, const Frame& frame, int row, int column) {
+    const int first = std::clamp(row - kWindowRadius, 0, sensor.height - kWindowSide);
+    std::vector<Beam> beams;
+    std::vector<Eigen::Vector3d> points;
+    for (int r = first; r < first + kWindowSide; ++r) {
+        for (int c = column - kWindowRadius; c <= column + kWindowRadius; ++c) {
+            const int wrapped = (c + sensor.width) % sensor.width;
+            beams.push_back(beam_of(sensor, r, wrapped));
+            points.push_back(point_of(sensor, frame, r, wrapped));
+        }
+    }
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    for (const auto& p : points) mean += p / kWindowPixels;
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+    for (const auto& p : points) covariance += (p - mean) * (p - mean).transpose() / kWindowPixels;
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance);
+    Window window;
+    window.normal = solver.eigenvectors().col(0);
+    if (window.normal.dot(mean) > 0.0) window.normal *= -1.0;
+    double squares = 0.0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const double off = window.normal.dot(points[i] - mean) / window.normal.dot(beams[i].direction);
+        squares += off * off / kWindowPixels;
+    }
+    window.deviation_m = std::sqrt(squares);
+    const Beam center = beam_of(sensor, row, column);
+    window.range_m = window.normal.dot(mean - center.origin) / window.normal.dot(center.direction);
+    return window;
+}
+
+Eigen::Vector3d normal_of(const PlaneWindows& windows, const PlaneRow& planes, int row, int k, int step) {
+    const auto i = static_cast<std::size_t>(k);
+    const BeamFrame beam = windows.beam(row, k * step);
+    const Eigen::Vector3f n = -(planes.inverse_range[i] * beam.direction + planes.slope_azimuth[i] * beam.along_row +
+                                planes.slope_altitude[i] * beam.up);
+    return n.normalized().cast<double>();
+}
+
+double angle_deg(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+    return std::atan2(a.cross(b).norm(), a.dot(b)) * 180.0 / std::numbers::pi;
+}
+
+struct Errors {
+    int windows = 0;
+    double fast_angle2 = 0.0, slow_angle2 = 0.0;
+    double fast_range2 = 0.0, slow_range2 = 0.0;
+    double between_max_deg = 0.0;        ///< largest angle between fast and slow
+    double between_range_max_m = 0.0;    ///< largest difference of the smoothed ranges
+    double between_deviation_max = 0.0;  ///< largest difference of the deviations
+};
+
+Errors compare(const SensorModel& sensor, const Eigen::Vector3d& normal, double offset, const Frame& frame, int step) {
+    PlaneWindows windows(sensor, step);
+    windows.load(frame);
+    PlaneRow planes;
+    Errors errors;
+    for (int row = 0; row < sensor.height; row += 5) {
+        windows.fit_row(row, planes);
+        for (int k = 0; k < windows.windows(); ++k) {
+            const auto i = static_cast<std::size_t>(k);
+            if (planes.inverse_range[i] <= 0.0F) continue;
+            const Beam beam = beam_of(sensor, row, k * step);
+            if (normal.dot(beam.direction) < 0.3) continue;  // grazing: nothing is known well
+            const Window slow = slow_window(sensor, frame, row, k * step);
+            const double truth_m = (offset - normal.dot(beam.origin)) / normal.dot(beam.direction);
+            const Eigen::Vector3d n = normal_of(windows, planes, row, k, step);
+            const double range_m = 1.0 / static_cast<double>(planes.inverse_range[i]);
+            errors.fast_angle2 += std::pow(angle_deg(n, -normal), 2);
+            errors.slow_angle2 += std::pow(angle_deg(slow.normal, -normal), 2);
+            errors.fast_range2 += std::pow(range_m - truth_m, 2);
+            errors.slow_range2 += std::pow(slow.range_m - truth_m, 2);
+            errors.between_max_deg = std::max(errors.between_max_deg, angle_deg(n, slow.normal));
+            errors.between_range_max_m = std::max(errors.between_range_max_m, std::abs(range_m - slow.range_m));
+            errors.between_deviation_max = std::max(
+                errors.between_deviation_max, std::abs(static_cast<double>(planes.deviation_m[i]) - slow.deviation_m));
+            ++errors.windows;
+        }
+    }
+    return errors;
+}
+
+struct Plane {
+    Eigen::Vector3d normal;  ///< away from the sensor
+    double offset_m;
+};
+
+class PlanesAround : public testing::TestWithParam<Plane> {};
+
+TEST_P(PlanesAround, WithoutNoiseAreThoseOfTheEigenDecomposition) {
+    const SensorModel sensor = staggered_sensor(64, 1024);
+    Frame frame(sensor);
+    const Eigen::Vector3d normal = GetParam().normal.normalized();
+    shoot_at_plane(sensor, normal, GetParam().offset_m, 0.0, frame);
+    const Errors e = compare(sensor, normal, GetParam().offset_m, frame, 4);
+    ASSERT_GT(e.windows, 200);
+    // What remains is the rounding of the ranges to millimetres.
+    EXPECT_LT(e.between_max_deg, 0.5);
+    EXPECT_LT(e.between_range_max_m, 5e-4);
+    EXPECT_LT(e.between_deviation_max, 3e-4);
+    EXPECT_LT(std::sqrt(e.fast_angle2 / e.windows), 0.2);
+    EXPECT_LT(std::sqrt(e.fast_range2 / e.windows), 3e-4);
+}
+
+TEST_P(PlanesAround, WithNoiseAreAtLeastAsGoodAsTheEigenDecomposition) {
+    const SensorModel sensor = staggered_sensor(64, 1024);
+    Frame frame(sensor);
+    const Eigen::Vector3d normal = GetParam().normal.normalized();
+    shoot_at_plane(sensor, normal, GetParam().offset_m, 0.01, frame);
+    const Errors e = compare(sensor, normal, GetParam().offset_m, frame, 4);
+    ASSERT_GT(e.windows, 200);
+    EXPECT_LE(e.fast_angle2, 1.05 * e.slow_angle2);
+    EXPECT_LE(e.fast_range2, 1.05 * e.slow_range2);
+    // Twenty-five ranges of 1 cm noise, averaged.
+    EXPECT_LT(std::sqrt(e.fast_range2 / e.windows), 0.0035);
+}
+
+TEST_P(PlanesAround, SufferLittleFromBeamsThatStartBesideEachOther) {
+    const SensorModel sensor = staggered_sensor(64, 1024, 0.0277F);
+    Frame frame(sensor);
+    const Eigen::Vector3d normal = GetParam().normal.normalized();
+    shoot_at_plane(sensor, normal, GetParam().offset_m, 0.0, frame);
+    const Errors e = compare(sensor, normal, GetParam().offset_m, frame, 4);
+    EXPECT_LT(std::sqrt(e.fast_angle2 / e.windows), 0.5);
+    EXPECT_LT(std::sqrt(e.fast_range2 / e.windows), 0.002);
+}
+
+INSTANTIATE_TEST_SUITE_P(PlaneWindows, PlanesAround,
+                         testing::Values(Plane{{1, 0, 0}, 4.0}, Plane{{0.2, -1, 0.1}, 6.0}, Plane{{-1, 1, 0}, 9.0},
+                                         Plane{{0, 0, -1}, 1.5}, Plane{{0.1, 0.2, 1}, 2.5}));
+
+TEST(PlaneWindows, StepLeavesOutWindowsAndChangesNone) {
+    const SensorModel sensor = staggered_sensor(16, 512);
+    Frame frame(sensor);
+    shoot_at_plane(sensor, Eigen::Vector3d(1, 0.3, 0.1).normalized(), 5.0, 0.01, frame);
+    PlaneWindows every(sensor, 1);
+    every.load(frame);
+    for (const int step : {2, 3, 4, 5, 7}) {
+        PlaneWindows some(sensor, step);
+        some.load(frame);
+        ASSERT_EQ(some.windows(), sensor.width / step);
+        PlaneRow all_planes, planes;
+        for (int row = 0; row < sensor.height; ++row) {
+            every.fit_row(row, all_planes);
+            some.fit_row(row, planes);
+            for (int k = 0; k < some.windows(); ++k) {
+                const auto i = static_cast<std::size_t>(k), j = static_cast<std::size_t>(k * step);
+                ASSERT_EQ(planes.inverse_range[i], all_planes.inverse_range[j]) << step << ' ' << row << ' ' << k;
+                ASSERT_EQ(planes.slope_azimuth[i], all_planes.slope_azimuth[j]);
+                ASSERT_EQ(planes.slope_altitude[i], all_planes.slope_altitude[j]);
+                ASSERT_EQ(planes.deviation_m[i], all_planes.deviation_m[j]);
+            }
+        }
+    }
+}
+
+TEST(PlaneWindows, AWindowWithAHoleIsNone) {
+    const SensorModel sensor = staggered_sensor(16, 512);
+    Frame frame(sensor);
+    frame.raw.range_mm.fill(5000);
+    frame.raw.range_mm(8, 100) = 0;
+    PlaneWindows windows(sensor, 1);
+    windows.load(frame);
+    PlaneRow planes;
+    for (int row = 0; row < sensor.height; ++row) {
+        windows.fit_row(row, planes);
+        for (int c = 50; c < 150; ++c) {
+            const bool has_hole = std::abs(row - 8) <= kWindowRadius && std::abs(c - 100) <= kWindowRadius;
+            EXPECT_EQ(planes.inverse_range[static_cast<std::size_t>(c)] <= 0.0F, has_hole) << row << ' ' << c;
+        }
+    }
+}
+
+TEST(PlaneWindows, NoneLiesAcrossTheSeamBetweenTheLastColumnFiredAndTheFirst) {
+    const SensorModel sensor = staggered_sensor(32, 512);
+    Frame frame(sensor);
+    frame.raw.range_mm.fill(5000);
+    PlaneWindows windows(sensor, 1);
+    windows.load(frame);
+    PlaneRow planes;
+    for (int row = 0; row < sensor.height; ++row) {
+        windows.fit_row(row, planes);
+        const int first = std::clamp(row - kWindowRadius, 0, sensor.height - kWindowSide);
+        for (int c = 0; c < sensor.width; ++c) {
+            int low = sensor.width, high = 0;
+            for (int r = first; r < first + kWindowSide; ++r) {
+                for (int d = -kWindowRadius; d <= kWindowRadius; ++d) {
+                    const int m = sensor.measurement_of(r, (c + d + sensor.width) % sensor.width);
+                    low = std::min(low, m);
+                    high = std::max(high, m);
+                }
+            }
+            EXPECT_EQ(planes.inverse_range[static_cast<std::size_t>(c)] > 0.0F, high - low < sensor.width / 2)
+                << row << ' ' << c;
+        }
+    }
+}
+
+TEST(PlaneWindows, ImagesWithFewerRowsThanAWindowHaveNone) {
+    const SensorModel sensor = staggered_sensor(4, 512);
+    Frame frame(sensor);
+    frame.raw.range_mm.fill(5000);
+    PlaneWindows windows(sensor, 1);
+    windows.load(frame);
+    PlaneRow planes;
+    for (int row = 0; row < sensor.height; ++row) {
+        windows.fit_row(row, planes);
+        for (const float inverse : planes.inverse_range) EXPECT_EQ(inverse, 0.0F);
+    }
+}
+
+TEST(PlaneWindows, BeamsAreThoseOfTheSensor) {
+    const SensorModel sensor = staggered_sensor(16, 512);
+    const PlaneWindows windows(sensor, 1);
+    for (int r = 0; r < sensor.height; ++r) {
+        for (int c = 0; c < sensor.width; c += 7) {
+            const BeamFrame beam = windows.beam(r, c);
+            EXPECT_LT((beam.direction.cast<double>() - beam_of(sensor, r, c).direction).norm(), 1e-6);
+            // Tangents: a right-handed frame, one along growing columns, one up.
+            EXPECT_LT(std::abs(beam.direction.dot(beam.along_row)), 1e-6F);
+            EXPECT_LT((beam.up - beam.along_row.cross(beam.direction)).norm(), 1e-6F);
+            const Eigen::Vector3d next = beam_of(sensor, r, (c + 1) % sensor.width).direction;
+            EXPECT_GT(next.dot(beam.along_row.cast<double>()), 0.0);
+            EXPECT_GT(beam.up.z(), 0.0F);
+        }
+    }
+}
+
+}  // namespace
+}  // namespace dlod::test
