@@ -29,7 +29,7 @@ struct Detector::State {
     void count(const Frame& frame);
     bool is_divided(const Segment& segment, const Counts& c) const;
     void detect(Frame& frame);
-    void add(Frame& frame, std::span<const PixelIndex> pixels);
+    void add(Frame& frame, std::size_t segment, std::span<const PixelIndex> pixels);
     void complete(Frame& frame);
 
     DetectionConfig config;
@@ -87,9 +87,10 @@ void Detector::State::test(const Frame& frame) {
     count(frame);
 }
 
-void Detector::State::add(Frame& frame, std::span<const PixelIndex> pixels) {
+void Detector::State::add(Frame& frame, std::size_t segment, std::span<const PixelIndex> pixels) {
     DetectionResult& result = frame.detection;
     Detection& detection = result.detections.emplace_back();
+    detection.segment = static_cast<std::uint32_t>(segment);
     detection.first = static_cast<std::uint32_t>(result.pixels.size());
     detection.count = static_cast<std::uint32_t>(pixels.size());
     result.pixels.insert(result.pixels.end(), pixels.begin(), pixels.end());
@@ -132,14 +133,14 @@ void Detector::State::detect(Frame& frame) {
     for (std::size_t s = 0; s < prepared.segments.size(); ++s) {
         const Segment& segment = prepared.segments[s];
         if (config.use_free_space && is_divided(segment, counts[s])) {
-            const auto add_part = [&](std::span<const PixelIndex> pixels) { add(frame, pixels); };
+            const auto add_part = [&](std::span<const PixelIndex> pixels) { add(frame, s, pixels); };
             // What is left of an object may be the part of it that rests.
             parts.find(frame, segment, evidence, add_part, [&](std::span<const PixelIndex> pixels) {
                 if (segment.feasible && pixels.size() >= static_cast<std::size_t>(config.parts.min_points))
-                    add(frame, pixels);
+                    add(frame, s, pixels);
             });
         } else if (segment.feasible && static_cast<double>(segment.max_range_m) <= config.max_range_m) {
-            add(frame, std::span(prepared.pixels).subspan(segment.first, segment.count));
+            add(frame, s, std::span(prepared.pixels).subspan(segment.first, segment.count));
         }
     }
 }

@@ -9,7 +9,7 @@ bool is_feasible(const Segment& segment, const FeasibilityConfig& config) {
     if (segment.count < static_cast<std::uint32_t>(config.min_points) || segment.rows < config.min_rows) return false;
     const Eigen::Vector3d size = (segment.max_m - segment.min_m).cast<double>();
     if (size.z() < config.min_height_m || size.z() > config.max_height_m) return false;
-    if (std::hypot(size.x(), size.y()) > config.max_length_m) return false;
+    if (static_cast<double>(segment.length_m) > config.max_length_m) return false;
     if (static_cast<double>(segment.min_m.z()) > config.max_lowest_point_m) return false;
     if (static_cast<double>(segment.max_range_m) > config.max_range_m) return false;
     std::array<double, 3> sides{size.x(), size.y(), size.z()};

@@ -42,12 +42,19 @@ constexpr std::size_t kBoundsStep = 4;
 }  // namespace
 
 void RangeImageSegmentation::Bounds::include(const StructuredCloud& cloud, std::size_t pixel) {
-    const float point[3] = {cloud.x[pixel], cloud.y[pixel], cloud.z[pixel]};
-    for (int i = 0; i < 3; ++i) {
+    const float x = cloud.x[pixel], y = cloud.y[pixel];
+    const float point[5] = {x, y, cloud.z[pixel], x + y, x - y};
+    for (int i = 0; i < 5; ++i) {
         low[i] = point[i] < low[i] ? point[i] : low[i];
         high[i] = point[i] > high[i] ? point[i] : high[i];
     }
     range = std::max(range, cloud.range_m[pixel]);
+}
+
+float RangeImageSegmentation::Bounds::length() const {
+    const auto extent = [this](int i) { return high[i] - low[i]; };
+    return std::max(std::max(extent(0), extent(1)),
+                    std::numbers::sqrt2_v<float> / 2.0F * std::max(extent(3), extent(4)));
 }
 
 RangeImageSegmentation::RangeImageSegmentation(const SensorModel& sensor, const SegmentationConfig& config)
@@ -195,6 +202,7 @@ void RangeImageSegmentation::collect(Preparation& prepared, const StructuredClou
         const Bounds& bounds = bounds_[i];
         segment.min_m = {bounds.low[0], bounds.low[1], bounds.low[2]};
         segment.max_m = {bounds.high[0], bounds.high[1], bounds.high[2]};
+        segment.length_m = bounds.length();
         segment.max_range_m = bounds.range;
         segment.feasible = is_feasible(segment, config_.feasibility);
     }

@@ -53,10 +53,12 @@ class RangeImageSegmentation {
 
     /// Of a segment.
     struct Bounds {
-        float low[3] = {1e9F, 1e9F, 1e9F};
-        float high[3] = {-1e9F, -1e9F, -1e9F};
+        // Along x, y, z and the diagonals x + y, x - y (longer by the root of 2).
+        float low[5] = {1e9F, 1e9F, 1e9F, 1e9F, 1e9F};
+        float high[5] = {-1e9F, -1e9F, -1e9F, -1e9F, -1e9F};
         float range = 0.0F;
         void include(const StructuredCloud& cloud, std::size_t pixel);
+        float length() const;
     };
 
     std::uint32_t find(std::uint32_t run);

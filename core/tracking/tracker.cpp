@@ -17,6 +17,7 @@ constexpr double kPartMargin_m = 0.15;  // a part's middle lies at most this far
 constexpr double kLimbMargin_m = 0.4;   // and that of a small piece beside a moving object
 constexpr unsigned kLimb = 3;           // small: a third of the object's pixels
 constexpr int kYoungHits = 10;
+constexpr double kRestSize = 1.2;         // the rest of an object is at most so many times as large as it was
 constexpr double kStackedOverlap = 0.25;  // share of the smaller height that two halves of one object have in common
 constexpr double kStackedShift_m = 0.4;   // and between their middles in the ground plane
 constexpr double kSameFootprint = 0.4;    // parts above one another share that much of the smaller footprint
@@ -36,6 +37,15 @@ double height_gap_m(const OrientedBox& a, const OrientedBox& b) {
 bool stacked(const OrientedBox& a, const OrientedBox& b) {
     return height_gap_m(a, b) > -kStackedOverlap * std::min(a.size_m.z(), b.size_m.z()) &&
            (a.center_m - b.center_m).head<2>().norm() < kStackedShift_m;
+}
+
+/// Of a large object that moves slowly only the front stands where it was free: evidence divides it, but its track
+/// knows its extent.
+bool is_rest_of(const TrackedObject& host, const Detection& rest) {
+    const OrientedBox box = host.box();
+    return host.state() == DynamicState::kDynamic && host.hits() >= kYoungHits &&
+           rest.box.size_m.head<2>().maxCoeff() < kRestSize * box.size_m.head<2>().maxCoeff() &&
+           rest.box.size_m.z() < kRestSize * box.size_m.z();
 }
 
 CandidateDetection candidate(const Detection& detection, const DetectionShape& shape) {
@@ -141,7 +151,9 @@ void Tracker::State::attach_parts(Frame& frame) {
             const auto t = static_cast<std::size_t>(matched[other]);
             const TrackedObject& host = objects[t];
             if (!near_footprint(host.box(), detections[d].centroid_m, kLimbMargin_m)) continue;
-            if (!host.steady() || candidates[d].motion * expected[t].motion < -0.2) continue;
+            if (!host.steady()) continue;
+            const bool rest = detections[d].segment == detections[other].segment && is_rest_of(host, detections[d]);
+            if (!rest && candidates[d].motion * expected[t].motion < -0.2) continue;
             const OrientedBox box = host.box();
             if (height_gap_m(box, detections[d].box) > kMaxGap_m) continue;
             double reach = kPartMargin_m;

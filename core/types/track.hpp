@@ -24,12 +24,14 @@ struct Segment {
     std::uint16_t rows = 0;   ///< number of image rows that it touches
     Eigen::Vector3f min_m = Eigen::Vector3f::Zero();  ///< bounds in the sensor frame, not deskewed
     Eigen::Vector3f max_m = Eigen::Vector3f::Zero();
+    float length_m = 0.0F;    ///< greatest horizontal extent, over four directions 45 degrees apart
     float max_range_m = 0.0F;
     bool feasible = false;    ///< passed the feasibility rules: may be an object
 };
 
 /// A candidate object of one frame: a feasible segment, or the part of one that evidence has singled out.
 struct Detection {
+    std::uint32_t segment = 0;  ///< index of the segment that it comes from
     std::uint32_t first = 0;  ///< its pixels are pixels[first .. first + count) of DetectionResult
     std::uint32_t count = 0;
     OrientedBox box;                  ///< world frame, of the visible points

@@ -56,6 +56,7 @@ std::vector<PixelIndex> SyntheticFrame::place(const Cylinder& cylinder) {
 Detection& SyntheticFrame::detect(const std::vector<PixelIndex>& pixels, bool moving) {
     DetectionResult& result = frame.detection;
     Detection detection;
+    detection.segment = static_cast<std::uint32_t>(result.detections.size());
     detection.first = static_cast<std::uint32_t>(result.pixels.size());
     detection.count = static_cast<std::uint32_t>(pixels.size());
     result.pixels.insert(result.pixels.end(), pixels.begin(), pixels.end());

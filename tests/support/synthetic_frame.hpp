@@ -29,7 +29,7 @@ class SyntheticFrame {
     void next(double dt_s = 0.1);
     /// Takes pixels that are still free, gives them the cylinder's points; returns the pixels' indices.
     std::vector<PixelIndex> place(const Cylinder& cylinder);
-    /// A detection of such pixels, all of whose points were tested against free space.
+    /// A detection of such pixels, a segment of its own, all of whose points were tested against free space.
     Detection& detect(const std::vector<PixelIndex>& pixels, bool moving);
     /// Both at once.
     Detection& add(const Cylinder& cylinder) { return detect(place(cylinder), cylinder.moving); }

@@ -117,6 +117,7 @@ TEST(RangeImageSegmentation, SegmentsDescribeTheirPixels) {
     EXPECT_EQ(segment.count, 240U);
     EXPECT_EQ(segment.rows, 20);
     EXPECT_FLOAT_EQ(segment.max_range_m, 5.0F);
+    EXPECT_NEAR(segment.length_m, 5.0F * 11.0F * 2.0F * std::numbers::pi_v<float> / 256.0F, 0.1F);
     EXPECT_TRUE(segment.feasible);
     ASSERT_EQ(frame.prepared.pixels.size(), 240U);
     for (const PixelIndex pixel : frame.prepared.pixels) {
@@ -138,6 +139,7 @@ TEST(Feasibility, EachRuleRejects) {
     person.rows = 20;
     person.min_m = {4.0F, 0.0F, -1.1F};
     person.max_m = {4.4F, 0.5F, 0.6F};
+    person.length_m = 0.6F;
     person.max_range_m = 5.0F;
     const FeasibilityConfig config;
     EXPECT_TRUE(is_feasible(person, config));
@@ -150,7 +152,7 @@ TEST(Feasibility, EachRuleRejects) {
     EXPECT_TRUE(rejected([](Segment& s) { s.rows = 1; }));
     EXPECT_TRUE(rejected([](Segment& s) { s.max_m.z() = s.min_m.z() + 0.1F; }));
     EXPECT_TRUE(rejected([](Segment& s) { s.max_m.z() = s.min_m.z() + 6.0F; }));
-    EXPECT_TRUE(rejected([](Segment& s) { s.max_m.x() = 40.0F; }));
+    EXPECT_TRUE(rejected([](Segment& s) { s.length_m = 40.0F; }));
     EXPECT_TRUE(rejected([](Segment& s) { s.min_m.z() = 2.0F, s.max_m.z() = 3.0F; }));
     EXPECT_TRUE(rejected([](Segment& s) { s.max_range_m = 80.0F; }));
     EXPECT_TRUE(rejected([](Segment& s) { s.max_m.x() = s.min_m.x() + 0.01F, s.max_m.y() = 0.02F; }));

@@ -158,6 +158,25 @@ TEST_F(TrackerTest, SplitPartsJoinTheirTrack) {
     EXPECT_EQ(scene.frame.detection.tracks[0].points, 100);
 }
 
+// Evidence divides a slow object: part of it stands where it was, part where it was not.
+TEST_F(TrackerTest, TheRestOfADividedObjectStaysPartOfIt) {
+    Tracker tracker(sensor, config);
+    for (int k = 0; k < 20; ++k) {
+        scene.next();
+        const auto all = scene.place(person(4.0 + 0.1 * k, 2.0));
+        if (k < 10) {
+            scene.detect(all, true);
+        } else {
+            const std::uint32_t segment = scene.detect({all.begin(), all.begin() + 40}, true).segment;
+            scene.detect({all.begin() + 40, all.end()}, false).segment = segment;
+        }
+        tracker.process(scene.frame);
+        ASSERT_EQ(scene.frame.detection.tracks.size(), 1U) << k;
+        EXPECT_EQ(scene.frame.detection.tracks[0].points, 120) << k;
+    }
+    EXPECT_EQ(scene.frame.detection.tracks[0].state, DynamicState::kDynamic);
+}
+
 // A track without a detection has no pixels: the reference kept old ones for up to nine scans.
 TEST_F(TrackerTest, AMissedTrackCoastsWithoutPixelsAndDies) {
     Tracker tracker(sensor, config);
