@@ -24,7 +24,7 @@ mkdir -p "$out"
 # LCM goes by UDP multicast that never leaves this host (TTL 0), on a port of its own.
 lcm_url="udpm://239.255.76.67:17667?ttl=0&recv_buf_size=2000000"
 replay_and_listen() {
-    local listener summary
+    local listener
     "$build/tools/listen/dlod-listen" --lcm "$lcm_url" >"$out/messages.txt" 2>"$out/listener.log" &
     listener=$!
     for _ in $(seq 150); do

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Installs what dlod needs to build, test and demonstrate itself on Debian 12.
-# usage: tools/install-deps.sh [--spy]
-#   --spy   also what lcm-spy needs (Java)
+# usage: tools/install-deps.sh [--package] [--spy]
+#   --package   also what makes and checks the Debian package
+#   --spy       also what lcm-spy needs (Java)
 # Does nothing, and needs neither network nor root, when everything is installed.
 set -euo pipefail
 
@@ -18,8 +19,9 @@ packages=(
 )
 for argument in "$@"; do
     case $argument in
+        --package) packages+=(dpkg-dev help2man lintian mmdebstrap) ;;
         --spy) packages+=(default-jdk-headless default-jre liblcm-java libjchart2d-java) ;;
-        *) sed -n '2,5s/^# //p' "$0"; exit 2 ;;
+        *) sed -n '2,6s/^# //p' "$0"; exit 2 ;;
     esac
 done
 

@@ -11,7 +11,7 @@ set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 build=${BUILD_DIR:-$here/../build}
 
-run= pcap= truth= out=
+run='' pcap='' truth='' out=''
 metadata=() config=()
 while [[ $# -gt 0 ]]; do
     case $1 in
@@ -74,5 +74,5 @@ gnuplot -e "run='$run'; out='$out'; errors='$errors'" "$here/report/plots.gp"
     printf '\n![from above](from_above.png)\n'
 } >"$out/report.md"
 
-cat "$out/report.md" | grep -v '^!\['
+grep -v '^!\[' "$out/report.md"
 echo "written: $out/report.md, plots (svg) and pictures (png) beside it"

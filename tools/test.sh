@@ -13,6 +13,7 @@ if [[ ${1:-} == --sanitizers ]]; then
     shift
 fi
 tools/install-deps.sh
+tools/install-deps.sh --package || echo "test.sh: the tests of the package that need these are skipped" >&2
 
 step() { printf '\n== %s (%d s since the start)\n' "$*" "$SECONDS"; }
 jobs=$(tools/build-jobs.sh)

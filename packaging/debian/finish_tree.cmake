@@ -1,0 +1,12 @@
+# Run by CPack on the installed files before they are packed: what Debian's policy wants and a plain installation does not.
+set(root ${CPACK_TEMPORARY_INSTALL_DIRECTORY})
+set(doc ${root}/usr/share/doc/dlod)
+file(RENAME ${root}/usr/etc ${root}/etc)
+file(MAKE_DIRECTORY ${root}/lib)
+file(RENAME ${root}/usr/lib/systemd ${root}/lib/systemd)
+file(COPY_FILE ${CMAKE_CURRENT_LIST_DIR}/copyright ${doc}/copyright)
+file(COPY_FILE ${CMAKE_CURRENT_LIST_DIR}/changelog ${doc}/changelog)
+file(GLOB compressed ${doc}/changelog ${root}/usr/share/man/man*/*)
+execute_process(COMMAND gzip -9nf ${compressed} COMMAND_ERROR_IS_FATAL ANY)
+file(GLOB_RECURSE files LIST_DIRECTORIES false ${root}/etc/* ${root}/lib/* ${root}/usr/share/* ${root}/usr/include/*)
+file(CHMOD ${files} PERMISSIONS OWNER_READ OWNER_WRITE GROUP_READ WORLD_READ)
