@@ -327,6 +327,7 @@ void FrameBuilder::close(Slot& slot) {
 }
 
 void FrameBuilder::finish(Frame& frame, const Slot& slot, std::uint32_t frame_id) {
+    decoder_.flush();
     counters_.mistimed_columns.add(static_cast<std::uint64_t>(clock_.reject(frame.columns)));
     clear_gaps(frame);
 

@@ -1,9 +1,13 @@
 #include "driver/packet_format.hpp"
 
 #include <algorithm>
+#include <bit>
+#include <cstring>
 
 namespace dlod::driver {
 namespace {
+
+static_assert(std::endian::native == std::endian::little, "packets are little-endian and read in place");
 
 // Headers and columns that all profiles but LEGACY and FUSA share.
 constexpr PacketFormat kCommon{
@@ -78,10 +82,24 @@ constexpr std::uint64_t low_bits(int bits) {
 std::uint64_t BitField::read(const std::byte* base) const {
     const std::byte* first = base + bit_offset / 8;
     const int skipped = bit_offset % 8;
+    const auto cut = [&](std::uint64_t word) { return ((word >> skipped) & low_bits(bits)) << shift; };
+    const auto load = [&]<class T>(T word) {
+        std::memcpy(&word, first, sizeof word);
+        return cut(word);
+    };
     const int bytes = (skipped + bits + 7) / 8;
-    std::uint64_t word = 0;
-    for (int i = 0; i < bytes; ++i) word |= static_cast<std::uint64_t>(first[i]) << (8 * i);
-    return ((word >> skipped) & low_bits(bits)) << shift;
+    switch (bytes) {
+        case 2:
+            return load(std::uint16_t{});
+        case 4:
+            return load(std::uint32_t{});
+        case 8:
+            return load(std::uint64_t{});
+        default:
+            std::uint64_t word = 0;
+            for (int i = 0; i < bytes; ++i) word |= static_cast<std::uint64_t>(first[i]) << (8 * i);
+            return cut(word);
+    }
 }
 
 void BitField::write(std::byte* base, std::uint64_t value) const {
