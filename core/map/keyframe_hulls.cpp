@@ -1,9 +1,13 @@
 #include "core/map/keyframe_hulls.hpp"
 
+// With their definitions, to be compiled here: libpcl_surface brings VTK along, and loading that takes as long
+// as three frames.
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 #include <pcl/surface/concave_hull.h>
 #include <pcl/surface/convex_hull.h>
+#include <pcl/surface/impl/concave_hull.hpp>
+#include <pcl/surface/impl/convex_hull.hpp>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
