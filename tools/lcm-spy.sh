@@ -18,11 +18,12 @@ fi
 [[ -f $types ]] || { echo "lcm-spy: $types is not there: $remedy" >&2; exit 1; }
 command -v java >/dev/null || { echo "lcm-spy: java is not there: $remedy" >&2; exit 1; }
 classpath=$types
-for jar in lcm jchart2d jide-oss xmlgraphics-commons; do
+for jar in lcm jchart2d jide-oss xmlgraphics-commons commons-io; do
     if [[ -f /usr/share/java/$jar.jar ]]; then
         classpath+=:/usr/share/java/$jar.jar
     elif [[ $jar == lcm || $jar == jchart2d ]]; then
         echo "lcm-spy: /usr/share/java/$jar.jar is not there: $remedy" >&2; exit 1
     fi
 done
-exec java -Djava.net.preferIPv4Stack=true -Xmx128m -ea -cp "$classpath" lcm.spy.Spy ${1:+--lcm-url="$1"}
+# lcm-spy looks into every class of the path: the export is for those of jide-oss.
+exec java --add-exports=java.desktop/sun.swing=ALL-UNNAMED -Djava.net.preferIPv4Stack=true -Xmx128m -ea -cp "$classpath" lcm.spy.Spy ${1:+--lcm-url="$1"}

@@ -22,6 +22,16 @@ if [[ -d $prefix/opt/share/man ]]; then
     done
 fi
 
+jar=$prefix/opt/share/dlod/dlod_types.jar
+if [[ -f $jar ]]; then
+    classes=$(jar tf "$jar")
+    for type in "$prefix"/opt/share/dlod/lcmtypes/dlod_*.lcm; do
+        type=$(basename "$type" .lcm)
+        grep -Fqx "dlod/${type#dlod_}.class" <<<"$classes"
+    done
+    echo "the jar for dlod-spy has all types"
+fi
+
 cmake -S "$prefix/opt/share/doc/dlod/examples" -B "$prefix/planner" -DCMAKE_PREFIX_PATH="$prefix/opt" >/dev/null
 cmake --build "$prefix/planner" >/dev/null
 ldd "$prefix/planner/example_subscriber" | grep liblcm
