@@ -67,6 +67,7 @@ PortSelection select_ports(const std::filesystem::path& capture, const ExpectedP
         selection.warnings.push_back(capture.string() + ": no " + what + " packets to port " + std::to_string(wanted) +
                                      " of the metadata; taking those to port " + std::to_string(port));
     };
+    if (source.counters().records.value() == 0) return selection;  // nothing is wrong with the metadata
     if (!lidar.found) {
         selection.warnings.push_back(
             capture.string() + ": no lidar packets of " + std::to_string(expected.lidar_bytes) +

@@ -2,6 +2,7 @@
 #include <deque>
 #include <memory>
 
+#include "daemon/commands/capture_metadata.hpp"
 #include "daemon/commands/commands.hpp"
 #include "driver/frame_builder.hpp"
 #include "driver/metadata.hpp"
@@ -69,9 +70,7 @@ ExitCode info(const std::filesystem::path& file, const std::optional<std::filesy
         print_sensor(driver::load_metadata(file));
         return ExitCode::kSuccess;
     }
-    auto metadata_file = file;
-    metadata_file.replace_extension(".json");
-    const auto sensor = driver::load_metadata(metadata.value_or(metadata_file));
+    const auto sensor = load_capture_metadata(file, metadata);
     print_sensor(sensor);
     print_capture(file, sensor);
     return ExitCode::kSuccess;

@@ -6,6 +6,7 @@
 #include <memory>
 #include <utility>
 
+#include "daemon/commands/capture_metadata.hpp"
 #include "daemon/commands/commands.hpp"
 #include "daemon/commands/load_config.hpp"
 #include "daemon/output/result_writer.hpp"
@@ -42,16 +43,6 @@ class ProgressBar {
   private:
     bool terminal_ = ::isatty(STDERR_FILENO) == 1;
 };
-
-std::filesystem::path metadata_of(const ReplayArguments& arguments) {
-    if (arguments.metadata) return *arguments.metadata;
-    auto path = arguments.capture;
-    path.replace_extension(".json");
-    if (!std::filesystem::exists(path)) {
-        throw driver::MetadataError(path.string() + ": not there; give the sensor's metadata with --metadata");
-    }
-    return path;
-}
 
 /// Ports as configured, else as the metadata says, else those that the sensor's packets go to.
 std::vector<std::uint16_t> capture_ports(const std::filesystem::path& capture, const driver::SensorInfo& sensor,
@@ -113,7 +104,7 @@ class Summary {
 }  // namespace
 
 ExitCode replay(const ReplayArguments& arguments) {
-    const auto sensor = driver::load_metadata(metadata_of(arguments));
+    const auto sensor = load_capture_metadata(arguments.capture, arguments.metadata);
     const Config config = load_config(arguments.config, &sensor);
     set_up_log(config.log.level);
     for (const auto& warning : sensor.warnings) spdlog::warn("{}", warning);

@@ -60,7 +60,8 @@ TEST(PortSelection, NothingFittingIsSaid) {
     EXPECT_EQ(s.lidar_port, 7502);
     ASSERT_EQ(s.warnings.size(), 1U);
     EXPECT_NE(s.warnings[0].find("3 of 1206 bytes to port 2368"), std::string::npos) << s.warnings[0];
-    EXPECT_NE(select({}).warnings.at(0).find("no UDP packets"), std::string::npos);
+    // An empty capture says nothing about the metadata.
+    EXPECT_TRUE(select({}).warnings.empty());
 }
 
 TEST(PortSelection, LooksNoFurtherThanTwoSeconds) {

@@ -111,7 +111,12 @@ TEST_F(CommandsTest, CapturesThatCannotBeUsed) {
         dlod({"replay", write("text.pcap", "this is no capture, but long enough to be one"), "--metadata", metadata}),
         4, {"text.pcap"}));
     EXPECT_TRUE(ends(dlod({"replay", write("nothing.pcap", ""), "--metadata", metadata}), 4, {"nothing.pcap"}));
-    EXPECT_TRUE(ends(dlod({"replay", write("alone.pcap", "")}), 3, {"alone.json", "--metadata"}));
+    // What is wrong with the capture is said before what is wrong with its metadata.
+    EXPECT_TRUE(ends(dlod({"replay", file("absent.pcap")}), 4, {"absent.pcap"}));
+    EXPECT_TRUE(ends(dlod({"info", file("absent.pcap")}), 4, {"absent.pcap"}));
+    std::filesystem::copy(capture_, file("alone.pcap"));
+    EXPECT_TRUE(ends(dlod({"replay", file("alone.pcap")}), 3, {"alone.json", "--metadata"}));
+    EXPECT_TRUE(ends(dlod({"info", file("alone.pcap")}), 3, {"alone.json", "--metadata"}));
     EXPECT_TRUE(ends(dlod({"replay", capture_, "--metadata", write("broken.json", "{\"beam_altitude_angles\": [1, 2")}),
                      3, {"broken.json"}));
 }
@@ -122,6 +127,15 @@ TEST_F(CommandsTest, ATruncatedCaptureIsReplayedToItsEnd) {
     bytes.resize(bytes.size() * 2 / 3 + 7);
     const auto cut = write("cut.pcap", bytes);
     EXPECT_TRUE(ends(dlod({"replay", cut, "--metadata", file("drive.json"), "--out", file("cut")}), 0, {"frames"}));
+}
+
+TEST_F(CommandsTest, AnEmptyCaptureIsSaidOnce) {
+    std::ifstream stream(capture_, std::ios::binary);
+    std::string header(24, '\0');
+    stream.read(header.data(), 24);
+    const auto outcome = dlod({"replay", write("empty.pcap", header), "--metadata", file("drive.json")});
+    EXPECT_TRUE(ends(outcome, 0, {"the capture has no packets", "0 frames"}));
+    EXPECT_EQ(outcome.output.find("metadata"), std::string::npos) << outcome.output;
 }
 
 TEST_F(CommandsTest, AnotherMakersCaptureGivesNoFrames) {
