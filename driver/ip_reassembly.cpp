@@ -28,7 +28,7 @@ enum class State {
     kFree,
     kWaiting,    ///< for fragments
     kComplete,   ///< delivered; kept to tell late duplicates from a new datagram with the same id
-    kCondemned,  ///< contradicted itself; whatever else comes under its id is rejected until it expires
+    kCondemned,  ///< contradicted itself; what comes under its id is rejected up to the next first fragment
 };
 
 }  // namespace
@@ -40,6 +40,8 @@ struct IpReassembly::Slot {
     std::uint64_t first_fragment = 0;  ///< running number, the order of age
     std::uint32_t length = 0;          ///< of the datagram; 0 until the last fragment is here
     std::uint32_t received = 0;        ///< bytes
+    bool contested = false;            ///< another datagram contradicted one of this id within the timeout
+    std::int64_t contested_ns = 0;     ///< when
     std::vector<Piece> pieces;         ///< sorted, disjoint
     std::unique_ptr<std::byte[]> bytes = std::make_unique_for_overwrite<std::byte[]>(kLargestDatagram);
 };
@@ -61,6 +63,23 @@ bool IpReassembly::expired(const Slot& slot, std::int64_t time_ns) const {
 void IpReassembly::give_up(Slot& slot, Counter& reason) {
     if (slot.state == State::kWaiting) ++reason;
     slot.state = State::kFree;
+    slot.contested = false;
+}
+
+void IpReassembly::begin(Slot& slot, std::int64_t time_ns) {
+    slot.state = State::kWaiting;
+    slot.first_ns = time_ns;
+    slot.first_fragment = counters_.fragments.value();
+    slot.length = 0;
+    slot.received = 0;
+    slot.contested = slot.contested && time_ns - slot.contested_ns <= limits_.timeout_ns;
+    slot.pieces.clear();
+}
+
+void IpReassembly::condemn(Slot& slot, std::int64_t time_ns) {
+    slot.state = State::kCondemned;
+    slot.contested = true;
+    slot.contested_ns = time_ns;
 }
 
 void IpReassembly::expire(std::int64_t time_ns) {
@@ -92,6 +111,7 @@ IpReassembly::Slot& IpReassembly::take_slot() {
 
 Bytes IpReassembly::add(const IpPacket& fragment, std::uint32_t vlan, std::int64_t time_ns) {
     ++counters_.fragments;
+    delivered_ = nullptr;
     if (time_ns >= next_sweep_ns_ || time_ns < next_sweep_ns_ - 2 * limits_.timeout_ns) {
         expire(time_ns);
         next_sweep_ns_ = time_ns + limits_.timeout_ns / 4;
@@ -118,42 +138,44 @@ Bytes IpReassembly::add(const IpPacket& fragment, std::uint32_t vlan, std::int64
                (!last || s.length == piece.end);
     };
 
-    if (slot != nullptr && slot->state == State::kCondemned) {
+    if (slot != nullptr && slot->state == State::kCondemned && piece.begin != 0) {
         ++counters_.rejected_fragments;
         return {};
     }
-    if (slot != nullptr && slot->state != State::kFree && repeats(*slot)) {
+    if (slot != nullptr && (slot->state == State::kWaiting || slot->state == State::kComplete) && repeats(*slot)) {
         ++counters_.duplicate_fragments;
         return {};
     }
-    // The id of a delivered datagram with other bytes: a new datagram.
-    if (slot != nullptr && slot->state == State::kComplete) slot->state = State::kFree;
-
-    if (slot == nullptr || slot->state == State::kFree) {
-        if (slot == nullptr) slot = &take_slot();
-        slot->state = State::kWaiting;
+    if (slot == nullptr) {
+        slot = &take_slot();
         slot->key = key;
-        slot->first_ns = time_ns;
-        slot->first_fragment = counters_.fragments.value();
-        slot->length = 0;
-        slot->received = 0;
-        slot->pieces.clear();
+        begin(*slot, time_ns);
+    } else if (slot->state != State::kWaiting) {
+        // The id of a delivered datagram with other bytes, or a first fragment after a contradiction: a new datagram.
+        begin(*slot, time_ns);
     }
 
-    const auto next = std::lower_bound(slot->pieces.begin(), slot->pieces.end(), piece,
-                                       [](const Piece& a, const Piece& b) { return a.begin < b.begin; });
+    const auto position = [&] {
+        return std::lower_bound(slot->pieces.begin(), slot->pieces.end(), piece,
+                                [](const Piece& a, const Piece& b) { return a.begin < b.begin; });
+    };
+    auto next = position();
     const bool overlaps = (next != slot->pieces.end() && next->begin < piece.end) ||
                           (next != slot->pieces.begin() && std::prev(next)->end > piece.begin);
     const bool contradicts_length = (slot->length != 0 && (last || piece.end > slot->length)) ||
                                     (last && !slot->pieces.empty() && slot->pieces.back().end > piece.end);
-    if (overlaps || contradicts_length) {
+    const bool out_of_turn = slot->contested && piece.begin != slot->received;
+    if (overlaps || contradicts_length || out_of_turn) {
         ++counters_.overlapping;
-        slot->state = State::kCondemned;
-        return {};
+        condemn(*slot, time_ns);
+        if (piece.begin != 0) return {};
+        // Senders that use one id for everything begin the next datagram so, after a fragment was lost.
+        begin(*slot, time_ns);
+        next = position();
     }
     if (slot->pieces.size() >= static_cast<std::size_t>(limits_.fragments)) {
         ++counters_.evicted;
-        slot->state = State::kCondemned;
+        condemn(*slot, time_ns);
         return {};
     }
 
@@ -163,8 +185,18 @@ Bytes IpReassembly::add(const IpPacket& fragment, std::uint32_t vlan, std::int64
     if (last) slot->length = piece.end;
     if (slot->length == 0 || slot->received != slot->length) return {};
     slot->state = State::kComplete;
+    delivered_ = slot;
     ++counters_.reassembled;
     return Bytes(slot->bytes.get(), slot->length);
+}
+
+bool IpReassembly::contested() const {
+    return delivered_ != nullptr && delivered_->contested;
+}
+
+void IpReassembly::refuse(std::int64_t time_ns) {
+    if (delivered_ != nullptr) condemn(*delivered_, time_ns);
+    delivered_ = nullptr;
 }
 
 void IpReassembly::finish() {

@@ -27,7 +27,7 @@ struct ReassemblyCounters {
     Counter reassembled;          ///< datagrams completed
     Counter duplicate_fragments;  ///< the same bytes again: ignored
     Counter overlapping;          ///< datagrams dropped: fragments contradicted each other (an id used again, say)
-    Counter rejected_fragments;   ///< late fragments of such datagrams
+    Counter rejected_fragments;   ///< further fragments of such datagrams
     Counter timed_out;            ///< datagrams whose fragments did not all come in time
     Counter evicted;              ///< datagrams given up because too many waited, or of too many fragments
     Counter malformed;            ///< fragments with an impossible offset or length
@@ -36,8 +36,10 @@ struct ReassemblyCounters {
 /// Puts IPv4 and IPv6 fragments together again. Fragments belong together when source, destination, protocol, id and
 /// VLAN agree. A fragment that overlaps another, or contradicts the datagram's length, condemns the whole datagram
 /// (RFC 5722, applied to IPv4 too); a fragment that repeats an earlier one byte by byte is ignored, also for a while
-/// after the datagram is complete. Two datagrams of the same id, each with fragments missing, can still fit like one:
-/// the caller verifies UDP's length and checksum. Deterministic; allocates only while it warms up.
+/// after the datagram is complete. After a contradiction the id is good again from the next first fragment on, but
+/// until the timeout only for fragments in order and without a gap. Two datagrams of the same id, each with fragments
+/// missing, can still fit like one: the caller verifies UDP's length and checksum. Deterministic; allocates only while
+/// it warms up.
 class IpReassembly {
   public:
     explicit IpReassembly(const ReassemblyLimits& limits = {});
@@ -46,6 +48,13 @@ class IpReassembly {
     /// Takes a fragment captured at `time_ns`. Returns the whole datagram's payload if this one completes it, else
     /// nothing. The bytes are valid until the next call.
     Bytes add(const IpPacket& fragment, std::uint32_t vlan, std::int64_t time_ns);
+
+    /// Of the datagram that add() returned last: another one had its id shortly before. Only with a right checksum is
+    /// it certain that nothing of the other is in it.
+    bool contested() const;
+
+    /// The datagram that add() returned just now is none: what comes under its id belongs to others.
+    void refuse(std::int64_t time_ns);
 
     /// At the capture's end: counts whatever is incomplete as timed out.
     void finish();
@@ -58,12 +67,15 @@ class IpReassembly {
 
     bool expired(const Slot& slot, std::int64_t time_ns) const;
     void give_up(Slot& slot, Counter& reason);
+    void begin(Slot& slot, std::int64_t time_ns);
+    void condemn(Slot& slot, std::int64_t time_ns);
     void expire(std::int64_t time_ns);
     Slot& take_slot();
 
     ReassemblyLimits limits_;
     std::vector<std::unique_ptr<Slot>> slots_;
     std::int64_t next_sweep_ns_ = 0;
+    Slot* delivered_ = nullptr;  ///< by the call of add() before
     ReassemblyCounters counters_;
 };
 

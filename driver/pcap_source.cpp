@@ -138,29 +138,25 @@ bool PcapSource::take_datagram(const IpPacket& ip, Bytes datagram, bool reassemb
     }
     const auto udp = parse_udp(ip.source, ip.destination, datagram);
     // Nothing is left over behind a reassembled datagram unless it was put together from two.
-    if (!udp || (reassembled && udp->length != datagram.size())) {
+    const bool fits = udp && (!reassembled || udp->length == datagram.size());
+    const bool wrong = fits && reassembled && udp->checksum == UdpChecksum::kWrong;
+    if (reassembled && (!fits || wrong)) reassembly_.refuse(time_ns);
+    if (!fits) {
         ++counters_.malformed;
         return false;
     }
-    if (!checksum_accepted(udp->checksum, reassembled)) {
+    // Where an id was in use by two, only a right checksum tells that the datagram is one of them.
+    if (wrong || (reassembled && reassembly_.contested() && udp->checksum != UdpChecksum::kRight)) {
         ++counters_.checksum_wrong;
         return false;
     }
+    // Captured whole, it can be nothing but this one datagram; what is damaged in it the frame builder finds.
+    if (udp->checksum == UdpChecksum::kWrong) ++counters_.checksum_ignored;
     packet_.data = udp->payload;
     packet_.receive_ns = time_ns;
     packet_.sender_address = ip.source;
     packet_.sender_port = udp->source_port;
     packet_.destination_port = udp->destination_port;
-    return true;
-}
-
-bool PcapSource::checksum_accepted(UdpChecksum checksum, bool reassembled) {
-    if (checksum == UdpChecksum::kRight && !reassembled) ++right_checksums_;
-    if (checksum != UdpChecksum::kWrong) return true;
-    if (reassembled) return false;
-    ++wrong_checksums_;
-    if (right_checksums_ > wrong_checksums_) return false;
-    ++counters_.checksum_ignored;
     return true;
 }
 

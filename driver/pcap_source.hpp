@@ -28,16 +28,17 @@ struct PcapCounters {
     Counter not_udp;           ///< TCP, ICMP and the like
     Counter cut_short;         ///< cut off by the snapshot length of the capture
     Counter malformed;         ///< IP or UDP headers that contradict themselves or the length
-    Counter checksum_wrong;    ///< dropped: UDP's checksum tells that bytes changed, or that fragments did not belong
-    Counter checksum_ignored;  ///< delivered with a wrong checksum, in a capture where it is wrong throughout
+    Counter checksum_wrong;    ///< dropped: UDP's checksum tells that fragments did not belong together
+    Counter checksum_ignored;  ///< captured whole and delivered with a wrong checksum
     Counter unreadable;        ///< 1 if the file ends in the middle of a record or becomes unreadable
 };
 
 /// Reads pcap and pcapng files (libpcap), micro- and nanosecond, of the link types of strip_link_layer, and yields
 /// their UDP datagrams one by one, fragments reassembled, `receive_ns` being the capture time.
 ///
-/// A wrong UDP checksum drops a reassembled datagram always, and a whole one if most of the capture's are right:
-/// captures with addresses made anonymous, or taken before the network card filled the checksum in, are still good.
+/// A wrong UDP checksum drops a reassembled datagram: it may be made of two. One that was captured whole is delivered
+/// and counted: captures with addresses made anonymous, or taken before the network card filled the checksum in, are
+/// still good, and what is damaged the frame builder finds.
 class PcapSource final : public PacketSource {
   public:
     /// Throws SourceError naming the file if it cannot be opened, is no capture, or has a link type not supported.
@@ -57,7 +58,6 @@ class PcapSource final : public PacketSource {
   private:
     bool take_record(Bytes frame, std::uint32_t original_length, std::int64_t time_ns);
     bool take_datagram(const IpPacket& ip, Bytes datagram, bool reassembled, std::int64_t time_ns);
-    bool checksum_accepted(UdpChecksum checksum, bool reassembled);
     PacketBatch finish(int result);
     void note_progress();
 
@@ -67,8 +67,6 @@ class PcapSource final : public PacketSource {
     int link_type_ = 0;
     std::uint64_t file_size_ = 0;
     bool ended_ = false;
-    std::uint64_t right_checksums_ = 0;  ///< of datagrams that were not fragmented
-    std::uint64_t wrong_checksums_ = 0;
     IpReassembly reassembly_;
     Packet packet_;
     PcapCounters counters_;

@@ -4,6 +4,7 @@
 
 #include <map>
 #include <random>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -204,22 +205,58 @@ TEST(PcapSource, CapturesOfFirstFragmentsOnlySaySo) {
     EXPECT_NE(warnings[0].find("filter on ports"), std::string::npos) << warnings[0];
 }
 
-TEST(PcapSource, WrongChecksumsDropWhatIsDamagedOnly) {
+TEST(PcapSource, WrongChecksumsOfWholeDatagramsAreDeliveredAndCounted) {
     const ScratchFolder folder;
-    const auto deliver = [&](const std::vector<Checksum>& checksums) {
+    const auto ignored = [&](const std::vector<Checksum>& checksums) {
         std::vector<Record> all;
         std::uint32_t i = 0;
         for (const Checksum c : checksums) all.push_back({kStart_ns, lidar_frame(i++, c)});
         PcapSource source(folder.write("capture", capture_file(FileKind::kNanosecond, 1, all)));
-        const std::size_t n = read_all(source).size();
-        EXPECT_EQ(n + source.counters().checksum_wrong.value(), checksums.size());
-        return n;
+        const auto got = read_all(source);
+        EXPECT_EQ(got.size(), checksums.size());
+        for (std::size_t k = 0; k < got.size(); ++k) {
+            EXPECT_EQ(got[k].data, payload_pattern(1200, static_cast<std::uint32_t>(k)));
+        }
+        EXPECT_EQ(source.counters().checksum_wrong.value(), 0U);
+        return source.counters().checksum_ignored.value();
     };
     using enum Checksum;
-    EXPECT_EQ(deliver({kRight, kRight, kWrong, kRight}), 3U);
-    EXPECT_EQ(deliver({kWrong, kWrong, kWrong}), 3U);  // addresses changed after the fact
-    EXPECT_EQ(deliver({kOffloaded, kOffloaded}), 2U);
-    EXPECT_EQ(deliver({kNone, kNone}), 2U);
+    EXPECT_EQ(ignored({kRight, kRight, kWrong, kRight}), 1U);
+    EXPECT_EQ(ignored({kWrong, kWrong, kWrong}), 3U);  // addresses changed after the fact
+    EXPECT_EQ(ignored({kOffloaded, kOffloaded}), 0U);
+    EXPECT_EQ(ignored({kNone, kNone}), 0U);
+}
+
+TEST(PcapSource, OneIdForEveryDatagramCostsNoMoreThanTheOneWithALostFragmentAndTheNext) {
+    const ScratchFolder folder;
+    for (const Checksum checksum : {Checksum::kRight, Checksum::kNone}) {
+        for (std::size_t lost = 0; lost < 3; ++lost) {
+            std::vector<Record> all;
+            std::set<std::string> sent;
+            constexpr std::uint32_t kDatagrams = 20;
+            for (std::uint32_t i = 0; i < kDatagrams; ++i) {
+                sent.insert(test::key_of(payload_pattern(4000, i)));
+                const auto fragments =
+                    test::ip_fragments(test::udp(payload_pattern(4000, i), {.checksum = checksum}), {});
+                ASSERT_EQ(fragments.size(), 3U);
+                for (std::size_t k = 0; k < fragments.size(); ++k) {
+                    if (i == 5 && k == lost) continue;
+                    all.push_back({kStart_ns + i * 100'000'000, test::link_frame(1, fragments[k])});
+                }
+            }
+            PcapSource source(folder.write("capture", capture_file(FileKind::kNanosecond, 1, all)));
+            std::set<std::string> got;
+            for (const Delivered& d : read_all(source)) got.insert(test::key_of(d.data));
+            if (checksum == Checksum::kRight) {
+                EXPECT_GE(got.size(), kDatagrams - 2) << lost;
+                for (const std::string& key : got) EXPECT_TRUE(sent.contains(key)) << lost;
+            } else if (lost > 0) {
+                // Without a checksum all are refused for as long as they could be made of two: a second.
+                EXPECT_EQ(got.size(), 5U + 3U) << lost;
+                for (const std::string& key : got) EXPECT_TRUE(sent.contains(key)) << lost;
+            }
+        }
+    }
 }
 
 TEST(PcapSource, ReassembledDatagramsMustPassTheirChecks) {
