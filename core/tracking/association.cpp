@@ -11,25 +11,70 @@ namespace dlod {
 namespace {
 
 constexpr double kBeyond = 2.0;      // any gated distance above 1
-constexpr double kMaxSlack_m = 3.0;  // of the boxes of the largest vehicles
+constexpr double kMaxSlack_m = 6.0;  // of the boxes of the largest vehicles
+constexpr double kSlack_m = 0.1;
+constexpr double kSlackOfSize = 0.15;
+constexpr double kSlackOfMissing = 0.25;
+// Where two tracks compete for one detection, the other part of the object was hidden, or two parts are seen as one
+// again: the established track is the object.
+constexpr double kYouth = 0.3;
+constexpr double kSameSize = 1.3;    // diagonals up to that ratio
+constexpr double kSameSize_m = 0.5;  // and that much more are the same size
+constexpr double kGrowth = 0.6;      // at twice of that and more
 
-/// Position of a track against a detection, in units of the gate: above 1 the pair is out of the question.
-double gated_distance(const ExpectedTrack& track, const CandidateDetection& detection,
-                      const AssociationConfig& config) {
+/// How a detection compares with one of a track's boxes.
+struct Comparison {
+    double distance = kBeyond;  ///< in units of the gate: above 1 the pair is out of the question
+    double iou = 0.0;
+};
+
+/// @param slack_m the detection's middle may be off by that much from the box's, apart from motion
+Comparison compare_box(const ExpectedTrack& track, const OrientedBox& box, const CandidateDetection& detection,
+                       double slack_m, const AssociationConfig& config) {
+    Comparison c;
+    const Eigen::Vector2d offset = (detection.visible.center_m - box.center_m).head<2>();
+    const double distance = offset.norm();
+    const double reach = config.max_speed_mps * track.dt_s + slack_m;
+    if (distance > reach) return c;
+    if (track.young) {
+        c.distance = distance / reach;
+    } else {
+        const Eigen::Vector2d expected = track.whole.center_m.head<2>() + offset;
+        const double d2 =
+            track.filter->plane_distance2(expected, detection.age_s, slack_m * slack_m * Eigen::Matrix2d::Identity());
+        c.distance = std::sqrt(d2) / config.gate_sigma;
+    }
+    if (c.distance <= 1.0) c.iou = box_iou(box, detection.visible);
+    return c;
+}
+
+/// Against the visible box of the last sighting or, where the object is seen better or worse than then, its whole box.
+Comparison compare(const ExpectedTrack& track, const CandidateDetection& detection, const AssociationConfig& config) {
     const Eigen::Vector2d offset = (detection.visible.center_m - track.visible.center_m).head<2>();
     const double farthest = config.max_speed_mps * track.dt_s + kMaxSlack_m;
-    if (offset.squaredNorm() > farthest * farthest) return kBeyond;
+    if (offset.squaredNorm() > farthest * farthest) return {};
     // Visible boxes shift by a part of their size when limbs and sides come and go.
-    const double slack =
-        0.1 + 0.15 * std::min(track.visible.size_m.head<2>().norm(), detection.visible.size_m.head<2>().norm());
-    const double distance = offset.norm();
-    const double reach = config.max_speed_mps * track.dt_s + slack;
-    if (distance > reach) return kBeyond;
-    if (track.young) return distance / reach;
-    const Eigen::Vector2d expected = track.filter->box().center_m.head<2>() + offset;
-    const double d2 =
-        track.filter->plane_distance2(expected, detection.age_s, slack * slack * Eigen::Matrix2d::Identity());
-    return std::sqrt(d2) / config.gate_sigma;
+    const double size = detection.visible.size_m.head<2>().norm();
+    const double slack = kSlack_m + kSlackOfSize * std::min(track.visible.size_m.head<2>().norm(), size);
+    const Comparison visible = compare_box(track, track.visible, detection, slack, config);
+    if (!track.established) return visible;
+    const double whole_size = track.whole.size_m.head<2>().norm();
+    const double whole_slack =
+        kSlack_m + kSlackOfSize * std::min(whole_size, size) + kSlackOfMissing * std::abs(whole_size - size);
+    const Comparison whole = compare_box(track, track.whole, detection, whole_slack, config);
+    return {std::min(visible.distance, whole.distance), std::max(visible.iou, whole.iou)};
+}
+
+/// A pair's cost never rises above that of no match.
+double with_youth(double cost, const ExpectedTrack& track, const AssociationConfig& config) {
+    return track.established ? cost : std::min(cost + kYouth, 0.5 * (cost + config.unmatched_cost));
+}
+
+/// Cost of believing that an object is suddenly much larger than it was: it has merged with something else.
+double growth(const ExpectedTrack& track, const CandidateDetection& detection) {
+    if (!track.established) return 0.0;
+    const double known = kSameSize * track.whole.size_m.head<2>().norm() + kSameSize_m;
+    return kGrowth * std::clamp(detection.visible.size_m.head<2>().norm() / known - 1.0, 0.0, 1.0);
 }
 
 /// Cost of believing two contradicting things about motion.
@@ -52,9 +97,8 @@ int root_of(std::vector<int>& parent, int i) {
 
 }  // namespace
 
-double Association::cost(const OrientedBox& a, int points_a, const OrientedBox& b, int points_b,
-                         const AssociationConfig& config) {
-    return config.alpha * (1.0 - box_iou(a, b)) + config.beta * relative_difference(points_a, points_b);
+double Association::cost(double iou, int points_a, int points_b, const AssociationConfig& config) {
+    return config.alpha * (1.0 - iou) + config.beta * relative_difference(points_a, points_b);
 }
 
 const std::vector<int>& Association::solve(std::span<const ExpectedTrack> tracks,
@@ -68,13 +112,13 @@ const std::vector<int>& Association::solve(std::span<const ExpectedTrack> tracks
         for (std::size_t d = 0; d < detections.size(); ++d) {
             const ExpectedTrack& track = tracks[t];
             const CandidateDetection& detection = detections[d];
-            if (gated_distance(track, detection, config) > 1.0) continue;
+            const Comparison boxes = compare(track, detection, config);
+            if (boxes.distance > 1.0) continue;
             // A box that fits is the object, whatever its evidence says of this frame.
-            const double c =
-                cost(track.visible, track.points, detection.visible, detection.points, config) +
-                contradiction(track, detection, config) * (1.0 - box_iou(track.visible, detection.visible));
+            const double c = cost(boxes.iou, track.points, detection.points, config) +
+                             contradiction(track, detection, config) * (1.0 - boxes.iou) + growth(track, detection);
             if (c < std::min(config.unmatched_cost, config.alpha))
-                pairs_.push_back({static_cast<int>(t), static_cast<int>(d), c});
+                pairs_.push_back({static_cast<int>(t), static_cast<int>(d), with_youth(c, track, config)});
         }
     }
     assign(tracks.size(), detections.size(), config.unmatched_cost);
@@ -87,12 +131,14 @@ const std::vector<int>& Association::solve(std::span<const ExpectedTrack> tracks
             if (track_of_[d] >= 0) continue;
             const ExpectedTrack& track = tracks[t];
             const CandidateDetection& detection = detections[d];
-            const double distance = gated_distance(track, detection, config);
+            const double distance = compare(track, detection, config).distance;
             if (distance > 1.0) continue;
-            const double c =
-                0.5 * distance + 0.3 * relative_difference(track.visible.size_m.z(), detection.visible.size_m.z()) +
-                0.2 * relative_difference(track.points, detection.points) + contradiction(track, detection, config);
-            if (c < config.unmatched_cost) pairs_.push_back({static_cast<int>(t), static_cast<int>(d), c});
+            const double c = 0.5 * distance +
+                             0.3 * relative_difference(track.visible.size_m.z(), detection.visible.size_m.z()) +
+                             0.2 * relative_difference(track.points, detection.points) +
+                             contradiction(track, detection, config) + growth(track, detection);
+            if (c < config.unmatched_cost)
+                pairs_.push_back({static_cast<int>(t), static_cast<int>(d), with_youth(c, track, config)});
         }
     }
     assign(tracks.size(), detections.size(), config.unmatched_cost);

@@ -12,10 +12,12 @@ namespace dlod {
 /// A track as it is expected in this frame.
 struct ExpectedTrack {
     OrientedBox visible;                   ///< last visible box, moved with the object
+    OrientedBox whole;                     ///< predicted box of the whole object
     const KalmanFilter* filter = nullptr;  ///< predicted to the frame's stamp
     int points = 0;                        ///< pixels when last seen
     bool young = false;                    ///< too few detections for its velocity to be known
     bool steady = false;                   ///< seen often enough to believe in it as an object of its own
+    bool established = false;              ///< seen so often that younger tracks give way
     double dt_s = 0.0;                     ///< since it was last seen
     double motion = 0.0;                   ///< belief that it moves: -1 (static) .. 1 (moving)
 };
@@ -38,8 +40,7 @@ class Association {
                                   const AssociationConfig& config);
 
     /// Eq. 5: alpha (1 - IoU) + beta (1 - min / max of the point counts).
-    static double cost(const OrientedBox& a, int points_a, const OrientedBox& b, int points_b,
-                       const AssociationConfig& config);
+    static double cost(double iou, int points_a, int points_b, const AssociationConfig& config);
 
   private:
     struct Pair {

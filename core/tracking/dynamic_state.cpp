@@ -103,6 +103,8 @@ DynamicState MotionBelief::fused(const MotionCues& cues, const DynamicStateConfi
     if (config.use_free_space && free_share(cues) < 0.0 && !cues.sustained_displacement) {
         step = std::min(step, std::max(0.0, kMostUnconfirmed * config.dynamic_log_odds - log_odds_));
     }
+    // It moves where it has hidden the space, or been itself: what that space said against motion is taken back.
+    if (cues.left_its_place) log_odds_ = std::max(log_odds_, 0.0);
     log_odds_ = std::clamp(log_odds_ + step, config.static_log_odds - 0.5, kMaxLogOdds);
     rest(cues, config);
     if (state_ == DynamicState::kDynamic) {

@@ -21,6 +21,7 @@ struct MotionCues {
     double shift_m = 0.0;                 ///< of the box centre from the track's first position, ground plane
     double displacement_log_odds = 0.0;   ///< of "moved" against "stayed", from the registration of its own points
     bool sustained_displacement = false;  ///< it has agreed with the filtered velocity for a while
+    bool left_its_place = false;          ///< and is longer than that what it hides could feign
     Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< filtered centre, ground plane
     double dt_s = 0.0;                                     ///< since the detection before
 };

@@ -23,6 +23,11 @@ MeasurementCovariance noise_of(const BoxMeasurement& m) {
     return R;
 }
 
+double largest_sd(const Eigen::Matrix2d& covariance) {
+    const double a = covariance(0, 0), b = covariance(1, 1), c = covariance(0, 1);
+    return std::sqrt(0.5 * (a + b) + std::hypot(0.5 * (a - b), c));
+}
+
 }  // namespace
 
 KalmanFilter::KalmanFilter(const BoxMeasurement& first, const KalmanConfig& config) {
@@ -79,6 +84,15 @@ void KalmanFilter::update(const BoxMeasurement& m, const KalmanConfig& config) {
     if (speed > config.max_speed_mps) state_.segment<3>(kVx) *= config.max_speed_mps / speed;
 }
 
+void KalmanFilter::update_velocity(const Eigen::Vector2d& velocity_mps, const Eigen::Matrix2d& covariance) {
+    const Eigen::Matrix<double, kStates, 2> PHt = covariance_.block<kStates, 2>(0, kVx);
+    const Eigen::Matrix2d S = PHt.block<2, 2>(kVx, 0) + covariance;
+    const Eigen::Matrix<double, kStates, 2> K = S.llt().solve(PHt.transpose()).transpose();
+    state_ += K * (velocity_mps - state_.segment<2>(kVx));
+    covariance_ -= K * PHt.transpose();
+    covariance_ = (0.5 * (covariance_ + covariance_.transpose())).eval();
+}
+
 void KalmanFilter::align_axes(double reference_yaw_rad) {
     const double quarter = 0.5 * std::numbers::pi;
     const double turns = std::round((reference_yaw_rad - state_(kYaw)) / quarter);
@@ -87,6 +101,14 @@ void KalmanFilter::align_axes(double reference_yaw_rad) {
     std::swap(state_(kLength), state_(kWidth));
     covariance_.row(kLength).swap(covariance_.row(kWidth));
     covariance_.col(kLength).swap(covariance_.col(kWidth));
+}
+
+void KalmanFilter::grow(double front_m, double back_m, double left_m, double right_m) {
+    const Eigen::Vector2d along(std::cos(state_(kYaw)), std::sin(state_(kYaw)));
+    const Eigen::Vector2d across(-along.y(), along.x());
+    state_.head<2>() += 0.5 * ((front_m - back_m) * along + (left_m - right_m) * across);
+    state_(kLength) += front_m + back_m;
+    state_(kWidth) += left_m + right_m;
 }
 
 double KalmanFilter::plane_distance2(const Eigen::Vector2d& position_m, double age_s,
@@ -106,9 +128,12 @@ OrientedBox KalmanFilter::box() const {
     return box;
 }
 
+double KalmanFilter::position_sd() const {
+    return largest_sd(covariance_.topLeftCorner<2, 2>());
+}
+
 double KalmanFilter::velocity_sd() const {
-    const double a = covariance_(kVx, kVx), b = covariance_(kVy, kVy), c = covariance_(kVx, kVy);
-    return std::sqrt(0.5 * (a + b) + std::hypot(0.5 * (a - b), c));
+    return largest_sd(covariance_.block<2, 2>(kVx, kVx));
 }
 
 Eigen::Matrix<double, 6, 6> KalmanFilter::motion_covariance() const {

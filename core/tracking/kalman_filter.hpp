@@ -36,9 +36,15 @@ class KalmanFilter {
     /// Joseph form: the covariance stays symmetric and positive definite.
     void update(const BoxMeasurement& measurement, const KalmanConfig& config);
 
+    /// Takes in a velocity in the ground plane, measured apart from the box.
+    void update_velocity(const Eigen::Vector2d& velocity_mps, const Eigen::Matrix2d& covariance);
+
     /// Turns the box's axes by the multiple of 90 degrees that brings the yaw nearest to the reference; an odd multiple
     /// swaps length and width. The footprint stays what it was.
     void align_axes(double reference_yaw_rad);
+
+    /// The object is longer or wider than was known: moves the ends of the box outwards, without any motion.
+    void grow(double front_m, double back_m, double left_m, double right_m);
 
     /// Squared Mahalanobis distance in the ground plane of a position measured with the given covariance.
     double plane_distance2(const Eigen::Vector2d& position_m, double age_s, const Eigen::Matrix2d& covariance) const;
@@ -46,7 +52,9 @@ class KalmanFilter {
     OrientedBox box() const;
     Eigen::Vector3d velocity() const { return state_.segment<3>(kVx); }
     double speed() const { return state_.segment<2>(kVx).norm(); }  ///< in the ground plane
-    /// Standard deviation of the velocity along its direction in the ground plane (largest axis), m/s.
+    /// Standard deviation of the position along the direction in the ground plane where it is largest, m.
+    double position_sd() const;
+    /// Standard deviation of the velocity along the direction in the ground plane where it is largest, m/s.
     double velocity_sd() const;
     /// Of position, then velocity.
     Eigen::Matrix<double, 6, 6> motion_covariance() const;

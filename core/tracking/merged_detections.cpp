@@ -13,6 +13,12 @@ constexpr double kLonger = 1.1;       // a detection of several objects is so mu
 constexpr double kSameObject = 0.35;  // tracks that share more of their footprints are one object seen twice
 constexpr double kMinPart = 10;       // pixels of each part
 constexpr double kMinShare = 0.25;    // of those that its track had: it was not hidden meanwhile
+constexpr double kMoving = 0.5;       // belief from which a track is worth being cut out
+constexpr double kSameSize = 1.3;     // footprint diagonals up to that ratio
+constexpr double kSameSize_m = 0.5;   // and that much more may be the track's
+constexpr double kMargin_m = 0.2;     // what lies so far outside of its box is not
+constexpr double kLong_m = 2.0;       // vehicles
+constexpr double kLongMargin_m = 2.0;
 
 double area(const OrientedBox& box) {
     return box.size_m.x() * box.size_m.y();
@@ -32,6 +38,7 @@ bool same_object(const OrientedBox& a, const OrientedBox& b) {
 
 void MergedDetections::divide(Frame& frame, DetectionShapes& shapes, std::span<const ExpectedTrack> tracks) {
     const std::size_t count = frame.detection.detections.size();
+    cut_.clear();
     for (std::size_t i = 0; i < count; ++i) {
         const Detection& detection = frame.detection.detections[i];
         covered_.clear();
@@ -45,15 +52,17 @@ void MergedDetections::divide(Frame& frame, DetectionShapes& shapes, std::span<c
             covered_.push_back(t);
             longest = std::max(longest, tracks[t].visible.size_m.head<2>().maxCoeff());
         }
-        if (covered_.size() > 1 && detection.box.size_m.head<2>().maxCoeff() > kLonger * longest)
-            divide_one(frame, shapes, tracks, i);
+        const bool divided = covered_.size() > 1 && detection.box.size_m.head<2>().maxCoeff() > kLonger * longest &&
+                             share_out(detection, shapes, tracks);
+        const auto moves_alone = [&](std::size_t t) { return cut_out(detection, shapes, tracks[t]); };
+        const bool cut = !divided && std::any_of(covered_.begin(), covered_.end(), moves_alone);
+        if (cut) cut_.push_back(i);
+        if (divided || cut) divide_one(frame, shapes, i);
     }
 }
 
-void MergedDetections::divide_one(Frame& frame, DetectionShapes& shapes, std::span<const ExpectedTrack> tracks,
-                                  std::size_t index) {
-    auto& detections = frame.detection.detections;
-    const Detection whole = detections[index];
+bool MergedDetections::share_out(const Detection& whole, const DetectionShapes& shapes,
+                                 std::span<const ExpectedTrack> tracks) {
     const PointSpan points = shapes.points(whole);
     owner_.resize(whole.count);
     counts_.assign(covered_.size(), 0);
@@ -73,9 +82,34 @@ void MergedDetections::divide_one(Frame& frame, DetectionShapes& shapes, std::sp
     }
     for (std::size_t k = 0; k < covered_.size(); ++k) {
         const double expected = kMinShare * tracks[covered_[k]].points;
-        if (static_cast<double>(counts_[k]) < std::max(kMinPart, expected)) return;
+        if (static_cast<double>(counts_[k]) < std::max(kMinPart, expected)) return false;
     }
+    return true;
+}
 
+bool MergedDetections::cut_out(const Detection& whole, const DetectionShapes& shapes, const ExpectedTrack& track) {
+    if (!track.established || track.motion < kMoving) return false;
+    OrientedBox box = track.whole;
+    if (whole.box.size_m.head<2>().norm() < kSameSize * box.size_m.head<2>().norm() + kSameSize_m) return false;
+    // More of a long object may come into view at its ends.
+    box.size_m.x() += box.size_m.x() > kLong_m ? 2.0 * kLongMargin_m : 2.0 * kMargin_m;
+    box.size_m.y() += 2.0 * kMargin_m;
+    const PointSpan points = shapes.points(whole);
+    owner_.resize(whole.count);
+    counts_.assign(2, 0);
+    for (std::size_t i = 0; i < whole.count; ++i) {
+        const Eigen::Vector3d p = shapes.origin() + Eigen::Vector3d(points.x[i], points.y[i], points.z[i]);
+        owner_[i] = footprint_distance_m(box, p) > 0.0 ? 1 : 0;
+        ++counts_[owner_[i]];
+    }
+    return static_cast<double>(counts_[0]) >= std::max(kMinPart, kMinShare * track.points) &&
+           static_cast<double>(counts_[1]) >= kMinPart;
+}
+
+void MergedDetections::divide_one(Frame& frame, DetectionShapes& shapes, std::size_t index) {
+    auto& detections = frame.detection.detections;
+    const Detection whole = detections[index];
+    const PointSpan points = shapes.points(whole);
     // Stable order by owner, in place of the whole.
     pixels_.assign(frame.detection.pixels.begin() + whole.first,
                    frame.detection.pixels.begin() + whole.first + whole.count);
@@ -84,7 +118,7 @@ void MergedDetections::divide_one(Frame& frame, DetectionShapes& shapes, std::sp
     z_.assign(points.z.begin(), points.z.end());
     LocalPoints& all = shapes.all_points();
     std::size_t to = whole.first;
-    for (std::size_t k = 0; k < covered_.size(); ++k) {
+    for (std::size_t k = 0; k < counts_.size(); ++k) {
         Detection part = whole;
         part.first = static_cast<std::uint32_t>(to);
         part.count = static_cast<std::uint32_t>(counts_[k]);

@@ -1,6 +1,7 @@
-// Detections that cover more than one track: two people side by side in one segment.
+// Detections that cover more than one object: two people side by side in one segment, a person against a wall.
 #pragma once
 
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -10,16 +11,27 @@
 namespace dlod {
 
 /// Divides each detection that covers several tracks between them, pixel by pixel: each pixel goes to the track whose
-/// expected box is nearer. What the detection says about motion is shared by the pixels. Keeps its memory.
+/// expected box is nearer. What is far too large to be the one moving track that it covers is divided into what lies
+/// inside of the track's box and the rest. What the detection says about motion is shared by the pixels. Keeps its
+/// memory.
 class MergedDetections {
   public:
     /// @param tracks expected in this frame; only `steady` ones take part
     void divide(Frame& frame, DetectionShapes& shapes, std::span<const ExpectedTrack> tracks);
 
+    /// Whether a detection of the frame was cut out of a larger one: it says nothing of its object's size.
+    bool is_cut(std::size_t detection) const { return std::binary_search(cut_.begin(), cut_.end(), detection); }
+
   private:
-    void divide_one(Frame& frame, DetectionShapes& shapes, std::span<const ExpectedTrack> tracks, std::size_t index);
+    /// Fills owner_ and counts_ for the tracks covered_; false where a part would be too small.
+    bool share_out(const Detection& whole, const DetectionShapes& shapes, std::span<const ExpectedTrack> tracks);
+    /// Likewise for the one track covered_ and the rest.
+    bool cut_out(const Detection& whole, const DetectionShapes& shapes, const ExpectedTrack& track);
+    /// Divides a detection by owner_ and counts_.
+    void divide_one(Frame& frame, DetectionShapes& shapes, std::size_t index);
 
     std::vector<std::size_t> covered_;
+    std::vector<std::size_t> cut_;  ///< ascending
     std::vector<std::size_t> owner_, counts_;
     std::vector<PixelIndex> pixels_;
     std::vector<float> x_, y_, z_;

@@ -9,7 +9,13 @@ namespace {
 
 constexpr double kNotSeen = 10.0;  // standard deviation of what was not measured, m or rad
 constexpr double kOblique = 0.35;  // sine of 20 degrees: a side seen flatter than that hides nothing
+constexpr double kLimb = 0.25;     // of the difference to the remembered size
 constexpr double kCarWidth_m = 1.8;
+constexpr double kWidest_m = 3.2;  // vehicles
+constexpr double kLongest_m = 25.0;
+constexpr double kVehicleLength_m = 4.0;   // of the smaller cars
+constexpr double kVehicleWidth_m = 1.4;    // what is as wide as that
+constexpr double kVehicleSpeed_mps = 3.0;  // and as fast is neither a person nor two side by side
 
 /// Which ends of an axis of the box are hidden.
 struct HiddenEnds {
@@ -30,48 +36,68 @@ HiddenEnds hidden_ends(const Eigen::Vector2d& axis, const OrientedBox& box, cons
 }
 
 struct CompletedSide {
-    double shift_m = 0.0;  ///< of the centre from that of the visible side
+    double center_m = 0.0;  ///< from the remembered centre, before the growth
     double size_m = 0.0;
     double position_sd_m = 0.0;
     double size_sd_m = 0.0;
+    double growth_low_m = 0.0, growth_high_m = 0.0;
 };
 
-/// @param toward_remembered where the remembered centre lies along the axis, from the visible one
-CompletedSide complete_side(double visible_m, double remembered_m, double toward_remembered, HiddenEnds hidden,
-                            const KalmanConfig& config) {
-    CompletedSide side{0.0, visible_m, config.position_sd_m, config.size_sd_m};
-    const double missing = remembered_m - visible_m;
-    if (missing <= 0.0 || (!hidden.low && !hidden.high)) {
+/// What is wide both ways is not one thing that can move: it has merged with another.
+double longest_beside(double other_side_m) {
+    return other_side_m > kWidest_m ? kWidest_m : kLongest_m;
+}
+
+/// @param center_m of the visible side, from the remembered centre
+/// @param most_m it grows no longer than that
+CompletedSide complete_side(double center_m, double visible_m, double before_m, double remembered_m, double most_m,
+                            HiddenEnds hidden, const KalmanConfig& config) {
+    CompletedSide side{center_m, visible_m, config.position_sd_m, config.size_sd_m, 0.0, 0.0};
+    if (!hidden.low && !hidden.high) {
         // A limb that is stretched out for a moment is not the object's size: seen ends move it by a little.
-        side.position_sd_m += 0.25 * std::abs(missing);
+        side.position_sd_m += kLimb * std::abs(remembered_m - visible_m);
         return side;
     }
-    side.size_m = remembered_m;
+    const double growth = std::max(0.0, std::min({visible_m, before_m, most_m}) - remembered_m);
+    side.size_m = remembered_m + growth;
     side.size_sd_m = kNotSeen;
+    const double missing = side.size_m - visible_m;
     if (hidden.low && hidden.high) {
-        side.shift_m = std::clamp(toward_remembered, -0.5 * missing, 0.5 * missing);
-        side.position_sd_m += 0.5 * missing;
+        // The visible part lies somewhere inside.
+        const double slack = 0.5 * std::max(0.0, missing);
+        const double toward = growth > 0.0 ? 0.0 : std::clamp(-center_m, -slack, slack);
+        side.center_m = center_m + toward;
+        const double beyond = std::clamp(center_m / std::max(1e-6, 0.5 * growth), -1.0, 1.0);
+        side.growth_high_m = 0.5 * (1.0 + beyond) * growth;
+        side.growth_low_m = growth - side.growth_high_m;
+        side.position_sd_m += 0.5 * std::abs(missing);
     } else {
-        side.shift_m = hidden.high ? 0.5 * missing : -0.5 * missing;
-        side.position_sd_m += 0.15 * missing;
+        side.center_m += hidden.high ? 0.5 * missing : -0.5 * missing;
+        (hidden.high ? side.growth_high_m : side.growth_low_m) = growth;
+        side.position_sd_m += missing > 0.0 ? 0.15 * missing : -kLimb * missing;
     }
     return side;
 }
 
 }  // namespace
 
-BoxMeasurement complete_extent(const OrientedBox& visible, const OrientedBox& remembered, const Visibility& visibility,
-                               const KalmanConfig& config) {
+ExtentMeasurement complete_extent(const OrientedBox& visible, const Eigen::Vector3d& before_m,
+                                  const OrientedBox& remembered, const Visibility& visibility,
+                                  const KalmanConfig& config) {
     const Eigen::Vector2d along(std::cos(visible.yaw_rad), std::sin(visible.yaw_rad));
     const Eigen::Vector2d across(-along.y(), along.x());
-    const Eigen::Vector2d toward = (remembered.center_m - visible.center_m).head<2>();
-    const CompletedSide length = complete_side(visible.size_m.x(), remembered.size_m.x(), along.dot(toward),
-                                               hidden_ends(along, visible, visibility), config);
-    const CompletedSide width = complete_side(visible.size_m.y(), remembered.size_m.y(), across.dot(toward),
-                                              hidden_ends(across, visible, visibility), config);
-    BoxMeasurement m;
+    const Eigen::Vector2d offset = (visible.center_m - remembered.center_m).head<2>();
+    const CompletedSide length =
+        complete_side(along.dot(offset), visible.size_m.x(), before_m.x(), remembered.size_m.x(),
+                      longest_beside(remembered.size_m.y()), hidden_ends(along, visible, visibility), config);
+    const CompletedSide width =
+        complete_side(across.dot(offset), visible.size_m.y(), before_m.y(), remembered.size_m.y(),
+                      longest_beside(remembered.size_m.x()), hidden_ends(across, visible, visibility), config);
+    ExtentMeasurement out;
+    out.growth = {length.growth_high_m, length.growth_low_m, width.growth_high_m, width.growth_low_m};
+    BoxMeasurement& m = out.box;
     m.box = visible;
-    m.box.center_m.head<2>() += length.shift_m * along + width.shift_m * across;
+    m.box.center_m.head<2>() = remembered.center_m.head<2>() + length.center_m * along + width.center_m * across;
     m.box.size_m.x() = length.size_m;
     m.box.size_m.y() = width.size_m;
     m.plane_covariance = length.position_sd_m * length.position_sd_m * along * along.transpose() +
@@ -79,7 +105,26 @@ BoxMeasurement complete_extent(const OrientedBox& visible, const OrientedBox& re
     m.z_sd_m = config.position_sd_m + 0.25 * std::abs(remembered.size_m.z() - visible.size_m.z());
     m.yaw_sd_rad = kNotSeen;
     m.size_sd_m = Eigen::Vector3d(length.size_sd_m, width.size_sd_m, config.size_sd_m);
-    return m;
+    return out;
+}
+
+Growth assumed_growth(const OrientedBox& box, double speed_mps, const Visibility& visibility) {
+    const Eigen::Vector2d along(std::cos(box.yaw_rad), std::sin(box.yaw_rad));
+    const Eigen::Vector2d across(-along.y(), along.x());
+    const double length = box.size_m.x(), width = box.size_m.y();
+    const bool vehicle = speed_mps > kVehicleSpeed_mps && width > kVehicleWidth_m;
+    const double missing_length = (vehicle ? kVehicleLength_m : std::min(0.5 * width, kCarWidth_m)) - length;
+    const double missing_width = std::min(0.5 * length, kCarWidth_m) - width;
+    Growth growth;
+    if (missing_length > 0.0) {
+        const HiddenEnds ends = hidden_ends(along, box, visibility);
+        if (ends.high != ends.low) (ends.high ? growth.front : growth.back) = missing_length;
+    }
+    if (missing_width > 0.0) {
+        const HiddenEnds ends = hidden_ends(across, box, visibility);
+        if (ends.high != ends.low) (ends.high ? growth.left : growth.right) = missing_width;
+    }
+    return growth;
 }
 
 OrientedBox assumed_box(const OrientedBox& visible, const Visibility& visibility) {

@@ -12,13 +12,31 @@ struct Visibility {
     bool occluded_right = false;
 };
 
-/// Box of the whole object from its visible box and the remembered one, axis by axis in the ground plane:
-/// the end towards the sensor is seen and anchors the box, the far end hides behind it, ends next to an occluder are
-/// frozen, and what is missing from the remembered size is filled in on the hidden side. A side seen from end to end
-/// is measured; of a hidden one only growth is. Yaw noise is left at "not seen".
+/// How much longer an object has proved to be than was known, at each end of its axes, metres.
+struct Growth {
+    double front = 0.0, back = 0.0, left = 0.0, right = 0.0;
+};
+
+/// What a sighting says about the whole object.
+struct ExtentMeasurement {
+    Growth growth;       ///< comes first: it is no motion
+    BoxMeasurement box;  ///< of the object that has grown
+};
+
+/// Box of the whole object from its visible box and the remembered one, axis by axis in the ground plane. An end that
+/// is seen says where the object is; the far end hides behind it, ends next to an occluder are hidden too. A side seen
+/// from end to end is measured. Where more of an object comes into view than was known it has grown at its hidden end:
+/// that moves its middle, but is no motion. Yaw noise is left at "not seen".
 /// @param visible at the yaw of `remembered`
-BoxMeasurement complete_extent(const OrientedBox& visible, const OrientedBox& remembered, const Visibility& visibility,
-                               const KalmanConfig& config);
+/// @param before_m size of the visible box of the sighting before: growth must be seen twice
+ExtentMeasurement complete_extent(const OrientedBox& visible, const Eigen::Vector3d& before_m,
+                                  const OrientedBox& remembered, const Visibility& visibility,
+                                  const KalmanConfig& config);
+
+/// What is missing from a moving object that has been seen from one side only, at the ends that hide: nothing is flat,
+/// and what is as wide and as fast as a vehicle is as long as one.
+/// @param speed_mps along the box's yaw
+Growth assumed_growth(const OrientedBox& box, double speed_mps, const Visibility& visibility);
 
 /// Size of a new object: as seen, but with a depth that is at least half of its width up to that of a car: what is seen
 /// from one side only is not flat.

@@ -23,6 +23,7 @@ constexpr double kAgainst = -0.7;    // "stayed" for one more frame
 constexpr double kMaxFit_m = 0.06;   // a worse fit than that is none
 constexpr double kMaxLogOdds = 1.5;  // one registration is no proof
 constexpr std::size_t kMinPoints = 10;
+constexpr double kAcceleration_mps2 = 2.0;  // of objects
 
 /// Horizontal normal at a pixel from its neighbours to the right and below (or left and above).
 bool normal_at(const Frame& frame, PixelIndex pixel, Eigen::Vector3f& normal) {
@@ -108,6 +109,16 @@ Fit fit(const PointSample& before, const PointSample& now, const Eigen::Vector2d
     return f;
 }
 
+/// From the mean of the points before to that of those now.
+Eigen::Vector2d between_means(const PointSample& before, const PointSample& now) {
+    const auto mean = [](const PointSample& s) {
+        Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+        for (std::size_t i = 0; i < s.size; ++i) sum += Eigen::Vector2d(s.x[i], s.y[i]);
+        return Eigen::Vector2d(s.origin_m.head<2>() + sum / static_cast<double>(s.size));
+    };
+    return mean(now) - mean(before);
+}
+
 }  // namespace
 
 void sample_points(const Frame& frame, std::span<const PixelIndex> pixels, PointSample& out) {
@@ -148,13 +159,14 @@ RegisteredDisplacement register_displacement(const PointSample& before, const Po
         const double half_trace = 0.5 * mean.trace();
         best.observable = half_trace - std::hypot(0.5 * (mean(0, 0) - mean(1, 1)), mean(0, 1));
     }
-    for (const Eigen::Vector2d& start : {Eigen::Vector2d::Zero().eval(), guess_m}) {
+    for (const Eigen::Vector2d& start : {Eigen::Vector2d::Zero().eval(), guess_m, between_means(before, now)}) {
         Eigen::Vector2d d = start;
         for (int k = 0; k < kIterations; ++k) {
             const Fit f = fit(before, now, d);
             if (f.cost_m2 < best.moved_m2) {
                 best.moved_m2 = f.cost_m2;
                 best.displacement_m = d;
+                best.normals = f.information / std::max(1, f.inliers);
             }
             if (f.inliers < static_cast<int>(kMinPoints) / 2) break;
             // A weak pull keeps directions that the normals do not see where they are.
@@ -165,6 +177,13 @@ RegisteredDisplacement register_displacement(const PointSample& before, const Po
         }
     }
     return best;
+}
+
+Eigen::Matrix2d velocity_covariance(const RegisteredDisplacement& r, double elapsed_s) {
+    const double fit = kNoise_m * kNoise_m / kIndependent;
+    const double changed = 0.5 * kAcceleration_mps2 * elapsed_s;
+    return fit / (elapsed_s * elapsed_s) * (r.normals + 1e-3 * Eigen::Matrix2d::Identity()).inverse() +
+           changed * changed * Eigen::Matrix2d::Identity();
 }
 
 double displacement_log_odds(const RegisteredDisplacement& r, double elapsed_s) {

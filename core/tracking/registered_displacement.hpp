@@ -35,12 +35,17 @@ struct RegisteredDisplacement {
     double in_place = 1.0;   ///< share of the points that still lie where the surface was
     /// How well the normals fix a displacement in the direction where they do so least; 0.5: in all directions alike.
     double observable = 0.0;
+    Eigen::Matrix2d normals = Eigen::Matrix2d::Zero();  ///< mean of n n^T over the points that fit when displaced
 };
 
 /// Registers `now` to `before` by translation in the ground plane.
 /// @param guess_m where to start beside "stayed"
 RegisteredDisplacement register_displacement(const PointSample& before, const PointSample& now,
                                              const Eigen::Vector2d& guess_m);
+
+/// Covariance [m^2/s^2] of the mean velocity over the displacement: noise of the fit, worse where the normals do not
+/// see a motion, and what an object may have accelerated since.
+Eigen::Matrix2d velocity_covariance(const RegisteredDisplacement& r, double elapsed_s);
 
 /// Log-odds of "moved" against "stayed": positive where a displacement explains the points much better than none,
 /// negative where they lie where they were and a motion would have shown.

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <numbers>
 
 #include "core/tracking/bounding_box.hpp"
+#include "core/tracking/rectangle_fit.hpp"
 
 namespace dlod {
 
@@ -13,13 +14,23 @@ namespace {
 constexpr int kYoungHits = 3;              // detections before a velocity means something
 constexpr int kEstablishedHits = 5;        // detections before its prediction is worth something
 constexpr int kBlindFrames = 2;            // a prediction is published where nothing is seen
+constexpr double kVague_m = 0.5;           // and none whose standard deviation is larger
 constexpr double kHeadingSpeed_mps = 0.7;  // slower objects may move sideways
 constexpr double kElongated = 1.6;         // a principal axis says where an object points
-constexpr double kAgreeing_m = 0.3;        // a shorter displacement may be noise
-constexpr double kAgreement = 0.4;         // of its length, from what the velocity predicts
+constexpr double kCutSize_m = 2.0;         // noise of the size of what was cut out by its own box
+constexpr double kVehicle_m = 2.5;         // vehicles are longer than people and cyclists
+constexpr double kDriving_mps = 1.0;
+constexpr double kLong_m = 1.5;        // sides of that length say it better
+constexpr double kMostSlip_rad = 0.6;  // between an object's heading and its sides
+constexpr double kAgreeing_m = 0.3;    // a shorter displacement may be noise
+constexpr double kAgreement = 0.4;     // of its length, from what the velocity predicts
 constexpr int kAgreeingFrames = 4;
+constexpr double kGross_m = 1.0;       // nothing that rests seems to move that far
+constexpr int kTrustedFrames = 2;      // until the registered velocity of a large object is one
+constexpr double kLarge_m = 1.6;       // footprint diagonal
 constexpr double kStale_s = 2.0;       // older ones show another side
 constexpr double kReference_s = 0.45;  // points to register to are renewed that often
+constexpr double kReference_m = 1.0;   // and after such a way: a fast object soon shows another side
 
 const DetectionShape& largest_shape(const DetectionShapes& shapes, const Sighting& sighting) {
     return shapes[sighting.detections.front()];
@@ -27,7 +38,9 @@ const DetectionShape& largest_shape(const DetectionShapes& shapes, const Sightin
 
 BoxMeasurement first_measurement(const DetectionShapes& shapes, const Sighting& sighting, const OrientedBox& visible,
                                  const KalmanConfig& config) {
-    BoxMeasurement m = complete_extent(visible, assumed_box(visible, sighting.visibility), sighting.visibility, config);
+    BoxMeasurement m =
+        complete_extent(visible, visible.size_m, assumed_box(visible, sighting.visibility), sighting.visibility, config)
+            .box;
     const DetectionShape& shape = largest_shape(shapes, sighting);
     m.age_s = shape.age_s;
     m.yaw_sd_rad = shape.axis.elongation > kElongated ? 0.2 : 1.0;
@@ -74,39 +87,51 @@ void TrackedObject::predict(double dt_s, const TrackingConfig& config) {
     ++age_;
 }
 
-std::pair<double, double> TrackedObject::measured_yaw(const PrincipalAxis& axis) {
+std::pair<double, double> TrackedObject::measured_yaw(const PointSpan& points) {
     const Eigen::Vector3d velocity = filter_.velocity();
     const double speed = filter_.speed();
     const double sd = filter_.velocity_sd();
-    const OrientedBox box = filter_.box();
-    const bool long_object = box.size_m.head<2>().maxCoeff() > 1.5 && axis.elongation > kElongated;
-    if (speed > kHeadingSpeed_mps && speed > 2.0 * sd) {
-        const double heading = std::atan2(velocity.y(), velocity.x());
-        filter_.align_axes(heading);
-        // The sides of a long object are known better than its heading.
-        if (long_object && std::abs(std::remainder(axis.yaw_rad - heading, std::numbers::pi)) < 0.5)
-            return {axis.yaw_rad, 0.1};
-        return {heading, std::max(0.1, sd / speed)};
+    const bool heads = speed > kHeadingSpeed_mps && speed > 2.0 * sd;
+    const double heading = heads ? std::atan2(velocity.y(), velocity.x()) : filter_.box().yaw_rad;
+    if (heads) filter_.align_axes(heading);
+    // The sides of a long object are known better than its heading.
+    if (std::max(filter_.box().size_m.head<2>().maxCoeff(), visible_.size_m.head<2>().maxCoeff()) > kLong_m) {
+        if (const auto sides = rectangle_yaw(points)) {
+            const double turn = std::remainder(*sides - heading, 0.5 * std::numbers::pi);
+            if (!heads || std::abs(turn) < kMostSlip_rad) return {wrap_angle(heading + turn), 0.1};
+        }
     }
-    if (long_object) {
-        filter_.align_axes(resolve_yaw(axis.yaw_rad, box.yaw_rad));
-        return {axis.yaw_rad, 0.15};
-    }
-    return {box.yaw_rad, 10.0};
+    if (heads) return {heading, std::max(0.1, sd / speed)};
+    return {heading, 10.0};
+}
+
+void TrackedObject::assume_extent(const Visibility& visibility) {
+    if (belief_.state() != DynamicState::kDynamic || hits_ < kEstablishedHits) return;
+    const bool heads_along = filter_.speed() > 4.0 * filter_.velocity_sd();
+    const Growth growth = assumed_growth(filter_.box(), heads_along ? filter_.speed() : 0.0, visibility);
+    filter_.grow(growth.front, growth.back, growth.left, growth.right);
 }
 
 void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const Sighting& sighting,
                         const TrackingConfig& config, std::vector<OrientedBox>& cleared) {
     const DetectionShape& shape = largest_shape(shapes, sighting);
     if (hits_ > 0) {
-        const auto [yaw, yaw_sd] = measured_yaw(shape.axis);
+        const auto [yaw, yaw_sd] = measured_yaw(shapes.points(frame.detection.detections[sighting.detections.front()]));
         const OrientedBox remembered = filter_.box();
+        Eigen::Vector3d before_m = visible_.size_m;
+        if (sighting.cut) {
+            before_m.y() = 0.0;
+            if (remembered.size_m.x() < kVehicle_m) before_m.x() = 0.0;
+        }
         visible_ = visible_box(frame, shapes, sighting, remembered.yaw_rad);
-        BoxMeasurement m = complete_extent(visible_, remembered, sighting.visibility, config.filter);
+        auto [growth, m] = complete_extent(visible_, before_m, remembered, sighting.visibility, config.filter);
+        filter_.grow(growth.front, growth.back, growth.left, growth.right);
         m.age_s = shape.age_s;
         m.box.yaw_rad = yaw;
         m.yaw_sd_rad = yaw_sd;
+        if (sighting.cut) m.size_sd_m.setConstant(kCutSize_m);
         filter_.update(m, config.filter);
+        assume_extent(sighting.visibility);
     }
     // At the stamp, as the filter's centre.
     visible_.center_m += shape.age_s * filter_.velocity() - filter_.box().center_m;
@@ -155,6 +180,7 @@ void TrackedObject::miss(Sight sight) {
 bool TrackedObject::visible_to_others() const {
     if (seen_now_) return true;
     if (belief_.state() != DynamicState::kDynamic || hits_ < kEstablishedHits || unseen_frames_ > hits_) return false;
+    if (filter_.position_sd() > kVague_m) return false;
     return sight_ == Sight::kNearer || sight_ == Sight::kThere ||
            (sight_ == Sight::kUnknown && unseen_frames_ <= kBlindFrames);
 }
@@ -190,13 +216,23 @@ void TrackedObject::displacement_cue(const Frame& frame, const Sighting& sightin
     } else {
         const auto r = register_displacement(before_, now, center - before_center_m_);
         cues.displacement_log_odds = displacement_log_odds(r, before_.age_s);
-        const Eigen::Vector2d expected = before_.age_s * filter_.velocity().head<2>();
-        const bool agrees = cues.displacement_log_odds > 0.0 && r.displacement_m.norm() > kAgreeing_m &&
-                            (r.displacement_m - expected).norm() < kAgreement * r.displacement_m.norm();
+        const double length_m = r.displacement_m.norm();
+        const auto agrees_with = [&](const Eigen::Vector2d& velocity_mps) {
+            return (r.displacement_m - before_.age_s * velocity_mps).norm() < kAgreement * length_m;
+        };
+        const bool clear = cues.displacement_log_odds > 0.0 && length_m > kAgreeing_m;
+        const bool agrees =
+            clear && (agrees_with(filter_.velocity().head<2>()) || agrees_with(registered_velocity_mps_));
         agreeing_ = agrees ? agreeing_ + 1 : 0;
         cues.sustained_displacement = agreeing_ >= kAgreeingFrames;
+        cues.left_its_place = cues.sustained_displacement && length_m > kGross_m;
+        registered_velocity_mps_.setZero();
+        if (clear) registered_velocity_mps_ = r.displacement_m / before_.age_s;
+        // The middle of what is seen of a large object is no measure of its motion; its own points are.
+        if (agreeing_ >= kTrustedFrames && filter_.box().size_m.head<2>().norm() > kLarge_m)
+            filter_.update_velocity(registered_velocity_mps_, velocity_covariance(r, before_.age_s));
     }
-    if (since_.age_s > kReference_s) {
+    if (since_.age_s > kReference_s || (center - since_center_m_).norm() > kReference_m) {
         before_ = since_;
         before_center_m_ = since_center_m_;
         since_ = now;
@@ -204,14 +240,21 @@ void TrackedObject::displacement_cue(const Frame& frame, const Sighting& sightin
     }
 }
 
+bool TrackedObject::drives() const {
+    return belief_.state() == DynamicState::kDynamic && filter_.box().size_m.head<2>().maxCoeff() > kVehicle_m &&
+           filter_.speed() > kDriving_mps && filter_.speed() > 2.0 * filter_.velocity_sd();
+}
+
 ExpectedTrack TrackedObject::expected() const {
     ExpectedTrack e;
     e.visible = visible_;
     e.visible.center_m += filter_.box().center_m;
+    e.whole = filter_.box();
     e.filter = &filter_;
     e.points = points_;
     e.young = hits_ < kYoungHits;
     e.steady = steady();
+    e.established = hits_ >= kEstablishedHits;
     e.dt_s = unseen_s_;
     e.motion = std::clamp(belief_.log_odds() / 3.0, -1.0, 1.0);
     return e;

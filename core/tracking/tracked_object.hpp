@@ -17,6 +17,7 @@ namespace dlod {
 struct Sighting {
     std::span<const std::size_t> detections;  ///< indices into the frame's, the largest part first; at least one
     std::size_t shape_parts = 1;  ///< so many of them, the first ones, say where and how large the object is
+    bool cut = false;             ///< its largest part was cut out of a larger detection by the object's box
     Visibility visibility;
 };
 
@@ -48,13 +49,19 @@ class TrackedObject {
     std::uint32_t id() const { return id_; }
     DynamicState state() const { return belief_.state(); }
     OrientedBox box() const { return filter_.box(); }
+    Eigen::Vector3d velocity() const { return filter_.velocity(); }
+    double velocity_sd() const { return filter_.velocity_sd(); }
+    /// It is as large as a vehicle, and under way.
+    bool drives() const;
     bool seen() const { return seen_now_; }  ///< in this frame
     int misses() const { return misses_; }
     int hits() const { return hits_; }
 
   private:
-    /// Which way the object points, from its motion or its shape; aligns the filter's axes and returns the noise.
-    std::pair<double, double> measured_yaw(const PrincipalAxis& axis);
+    /// Which way the object points, from its motion or its sides, and the noise of that; aligns the filter's axes.
+    std::pair<double, double> measured_yaw(const PointSpan& points);
+    /// Of what moves, more is there than one side shows.
+    void assume_extent(const Visibility& visibility);
     bool clear_without_displacement(const MotionCues& cues) const;
     /// Registers this frame's points to earlier ones, and renews those.
     void displacement_cue(const Frame& frame, const Sighting& sighting, MotionCues& cues);
@@ -71,7 +78,8 @@ class TrackedObject {
     PointSample before_;  ///< points of half a second to a second ago, or of the first sighting
     PointSample since_;   ///< those that follow them
     Eigen::Vector2d before_center_m_ = Eigen::Vector2d::Zero(), since_center_m_ = Eigen::Vector2d::Zero();
-    int agreeing_ = 0;  ///< frames in a row in which registered displacement and filtered velocity agreed
+    Eigen::Vector2d registered_velocity_mps_ = Eigen::Vector2d::Zero();  ///< by the last registration, 0 if not clear
+    int agreeing_ = 0;  ///< frames in a row in which it agreed with the filter's or that of the frame before
     double unseen_s_ = 0.0;
     double residual_m_ = 0.0;
     int points_ = 0;  ///< of the last sighting

@@ -1,6 +1,7 @@
 #include "core/tracking/tracker.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "core/tracking/association.hpp"
@@ -16,6 +17,10 @@ namespace {
 constexpr double kPartMargin_m = 0.15;  // a part's middle lies at most this far outside of the whole object's box
 constexpr double kLimbMargin_m = 0.4;   // and that of a small piece beside a moving object
 constexpr unsigned kLimb = 3;           // small: a third of the object's pixels
+constexpr double kInside = 0.6;         // of its footprint lies inside of those margins
+constexpr double kInsideVehicle = 0.8;  // or of a moving vehicle's box itself
+constexpr double kSimilar = 1.5;        // ratio of footprint diagonals
+constexpr double kSameVelocity_mps = 1.0;
 constexpr int kYoungHits = 10;
 constexpr double kRestSize = 1.2;         // the rest of an object is at most so many times as large as it was
 constexpr double kStackedOverlap = 0.25;  // share of the smaller height that two halves of one object have in common
@@ -46,6 +51,30 @@ bool is_rest_of(const TrackedObject& host, const Detection& rest) {
     return host.state() == DynamicState::kDynamic && host.hits() >= kYoungHits &&
            rest.box.size_m.head<2>().maxCoeff() < kRestSize * box.size_m.head<2>().maxCoeff() &&
            rest.box.size_m.z() < kRestSize * box.size_m.z();
+}
+
+/// Share of a part's footprint that lies inside of a box with a margin.
+double share_inside(const OrientedBox& part, OrientedBox box, double margin_m) {
+    box.size_m.head<2>().array() += 2.0 * margin_m;
+    return footprint_intersection_m2(part, box) / (part.size_m.x() * part.size_m.y());
+}
+
+/// Two tracks on one vehicle that an occluder divides: the one inside of the other, at the same velocity.
+bool one_vehicle(const TrackedObject& whole, const TrackedObject& piece) {
+    if (!whole.drives()) return false;
+    const double differs = (whole.velocity() - piece.velocity()).head<2>().norm();
+    const double tolerance = kSameVelocity_mps + 2.0 * (whole.velocity_sd() + piece.velocity_sd());
+    return differs < tolerance && share_inside(piece.box(), whole.box(), kLimbMargin_m) > kInside &&
+           piece.box().size_m.head<2>().norm() < whole.box().size_m.head<2>().norm();
+}
+
+/// Whether a track that is seen may be the object of one that is not: what moves is not taken for something that rests,
+/// nor a person for what is far larger.
+bool may_replace(const TrackedObject& seen, const TrackedObject& unseen) {
+    if (unseen.state() != DynamicState::kDynamic || !unseen.steady()) return true;
+    if (seen.drives()) return true;
+    return seen.state() == DynamicState::kDynamic &&
+           seen.box().size_m.head<2>().norm() < kSimilar * unseen.box().size_m.head<2>().norm();
 }
 
 CandidateDetection candidate(const Detection& detection, const DetectionShape& shape) {
@@ -136,8 +165,8 @@ void Tracker::State::associate(Frame& frame) {
 }
 
 // What is left and lies inside of the box of an object that was found is a part of it, split off by an occluder; small
-// pieces beside a moving one are its limbs. A young track on such a piece gives it up, and so does the younger of two
-// tracks that stand on top of one another.
+// pieces beside a moving one are its limbs. A young track on such a piece gives it up, and so do the younger of two
+// tracks that stand on top of one another and the smaller of two that are pieces of one vehicle.
 void Tracker::State::attach_parts(Frame& frame) {
     const auto& detections = frame.detection.detections;
     const std::vector<int> matched = owner;
@@ -150,28 +179,30 @@ void Tracker::State::attach_parts(Frame& frame) {
             if (matched[other] < 0 || matched[other] == own) continue;
             const auto t = static_cast<std::size_t>(matched[other]);
             const TrackedObject& host = objects[t];
-            if (!near_footprint(host.box(), detections[d].centroid_m, kLimbMargin_m)) continue;
-            if (!host.steady()) continue;
-            const bool rest = detections[d].segment == detections[other].segment && is_rest_of(host, detections[d]);
-            if (!rest && candidates[d].motion * expected[t].motion < -0.2) continue;
+            const TrackedObject* guest = own >= 0 ? &objects[static_cast<std::size_t>(own)] : nullptr;
+            if (!near_footprint(host.box(), detections[d].centroid_m, kLimbMargin_m) || !host.steady()) continue;
             const OrientedBox box = host.box();
+            // Where a vehicle drives there is nothing else, even if it has been there itself before.
+            const bool rest = (detections[d].segment == detections[other].segment && is_rest_of(host, detections[d])) ||
+                              (host.drives() && share_inside(detections[d].box, box, 0.0) > kInsideVehicle);
+            if (!rest && candidates[d].motion * expected[t].motion < -0.2) continue;
             if (height_gap_m(box, detections[d].box) > kMaxGap_m) continue;
             double reach = kPartMargin_m;
-            if (own >= 0) {
-                const TrackedObject& guest = objects[static_cast<std::size_t>(own)];
-                const bool on_top = host.id() < guest.id() && stacked(detections[other].box, detections[d].box);
-                const bool young = guest.hits() < kYoungHits && host.hits() >= 2 * guest.hits();
-                if (!on_top && !young) continue;
+            if (guest != nullptr) {
+                const bool on_top = host.id() < guest->id() && stacked(detections[other].box, detections[d].box);
+                const bool young = guest->hits() < kYoungHits && host.hits() >= 2 * guest->hits();
+                if (!on_top && !young && !one_vehicle(host, *guest)) continue;
                 if (on_top) reach = kLimbMargin_m;
             } else if (host.state() == DynamicState::kDynamic &&
                        kLimb * detections[d].count < detections[other].count) {
                 reach = kLimbMargin_m;
             }
+            if (host.drives()) reach = kLimbMargin_m;
             const double distance_m = footprint_distance_m(box, detections[d].centroid_m);
-            if (distance_m < best * reach) {
+            if (distance_m < best * reach && share_inside(detections[d].box, box, reach) > kInside) {
                 best = distance_m / reach;
                 owner[d] = matched[other];
-                limb[d] = distance_m > kPartMargin_m ? 1 : 0;
+                limb[d] = distance_m > kPartMargin_m && !host.drives() ? 1 : 0;
             }
         }
         if (own >= 0 && owner[d] != own) absorbed[static_cast<std::size_t>(own)] = 1;
@@ -189,12 +220,26 @@ Sighting Tracker::State::sighting_of(const Frame& frame, std::size_t t) {
     });
     Sighting sighting;
     sighting.detections = parts;
+    if (parts.empty()) return sighting;
     sighting.shape_parts = static_cast<std::size_t>(
         std::count_if(parts.begin(), parts.end(), [&](std::size_t d) { return limb[d] == 0; }));
+    sighting.cut = merged.is_cut(parts.front());
     sighting.visibility.sensor_m = frame.odometry.T_world_sensor.translation();
-    for (std::size_t d : parts) {
-        sighting.visibility.occluded_left |= detections[d].occluded_left;
-        sighting.visibility.occluded_right |= detections[d].occluded_right;
+    // Of several parts, the outermost say whether the ends are hidden.
+    const Eigen::Vector2d ahead = (detections[parts.front()].centroid_m - sighting.visibility.sensor_m).head<2>();
+    double leftmost = 0.0, rightmost = 0.0;
+    for (std::size_t k = 0; k < sighting.shape_parts; ++k) {
+        const Detection& part = detections[parts[k]];
+        const Eigen::Vector2d to = (part.centroid_m - sighting.visibility.sensor_m).head<2>();
+        const double left = std::atan2(ahead.x() * to.y() - ahead.y() * to.x(), ahead.dot(to));
+        if (k == 0 || left > leftmost) {
+            leftmost = left;
+            sighting.visibility.occluded_left = part.occluded_left;
+        }
+        if (k == 0 || left < rightmost) {
+            rightmost = left;
+            sighting.visibility.occluded_right = part.occluded_right;
+        }
     }
     return sighting;
 }
@@ -213,7 +258,8 @@ void Tracker::State::see_and_miss(Frame& frame) {
         if (object.seen()) return false;
         if (absorbed[static_cast<std::size_t>(&object - objects.data())] != 0) return true;
         return std::any_of(objects.begin(), objects.end(), [&](const TrackedObject& other) {
-            return other.seen() && shared_footprint(object.box(), other.box()) > kDuplicate;
+            return other.seen() && may_replace(other, object) &&
+                   shared_footprint(object.box(), other.box()) > kDuplicate;
         });
     };
     std::vector<std::size_t>& gone = parts;

@@ -4,6 +4,8 @@
 
 #include <random>
 
+#include "core/tracking/box_iou.hpp"
+
 namespace dlod {
 namespace {
 
@@ -57,13 +59,17 @@ struct Scene {
     }
 };
 
+double cost(const OrientedBox& a, int points_a, const OrientedBox& b, int points_b, const AssociationConfig& config) {
+    return Association::cost(box_iou(a, b), points_a, points_b, config);
+}
+
 TEST(Association, CostIsThatOfThePaper) {
     const AssociationConfig config;
-    EXPECT_NEAR(Association::cost(person_box(0, 0), 100, person_box(0, 0), 100, config), 0.0, 1e-12);
-    EXPECT_NEAR(Association::cost(person_box(0, 0), 100, person_box(0, 0), 50, config), 0.1 * 0.5, 1e-12);
-    EXPECT_NEAR(Association::cost(person_box(0, 0), 100, person_box(9, 0), 100, config), 0.8, 1e-12);
-    EXPECT_NEAR(Association::cost(person_box(0, 0), 100, person_box(0.3, 0), 25, config),
-                0.8 * (1.0 - 1.0 / 3.0) + 0.1 * 0.75, 1e-12);
+    EXPECT_NEAR(cost(person_box(0, 0), 100, person_box(0, 0), 100, config), 0.0, 1e-12);
+    EXPECT_NEAR(cost(person_box(0, 0), 100, person_box(0, 0), 50, config), 0.1 * 0.5, 1e-12);
+    EXPECT_NEAR(cost(person_box(0, 0), 100, person_box(9, 0), 100, config), 0.8, 1e-12);
+    EXPECT_NEAR(cost(person_box(0, 0), 100, person_box(0.3, 0), 25, config), 0.8 * (1.0 - 1.0 / 3.0) + 0.1 * 0.75,
+                1e-12);
 }
 
 TEST(Association, OverlapDecides) {
@@ -87,7 +93,7 @@ TEST(Association, AFarPairStealsNoMatch) {
     std::vector<double> ungated;
     for (const ExpectedTrack& t : s.tracks) {
         for (const CandidateDetection& d : s.detections)
-            ungated.push_back(Association::cost(t.visible, t.points, d.visible, d.points, {}));
+            ungated.push_back(cost(t.visible, t.points, d.visible, d.points, {}));
     }
     Hungarian hungarian;
     ASSERT_EQ(hungarian.solve(ungated, 2, 2), (std::vector<int>{1, 0}));
@@ -141,8 +147,8 @@ TEST(Association, GroupsGiveTheOptimumOfTheWhole) {
         double sum = 0.0;
         for (std::size_t t = 0; t < 40; ++t) {
             for (std::size_t d = 0; d < 40; ++d) {
-                const double c = Association::cost(s.tracks[t].visible, s.tracks[t].points, s.detections[d].visible,
-                                                   s.detections[d].points, config);
+                const double c = cost(s.tracks[t].visible, s.tracks[t].points, s.detections[d].visible,
+                                      s.detections[d].points, config);
                 if (c < config.alpha) whole[t * 40 + d] = c;
             }
             sum += match[t] >= 0 ? whole[t * 40 + static_cast<std::size_t>(match[t])] : config.unmatched_cost;
