@@ -20,7 +20,7 @@ constexpr double kSlackOfMissing = 0.25;
 constexpr double kYouth = 0.3;
 constexpr double kSameSize = 1.3;    // diagonals up to that ratio
 constexpr double kSameSize_m = 0.5;  // and that much more are the same size
-constexpr double kGrowth = 0.6;      // at twice of that and more
+constexpr double kGrowth = 0.9;      // at twice of that and more
 
 /// How a detection compares with one of a track's boxes.
 struct Comparison {

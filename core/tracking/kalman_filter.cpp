@@ -12,6 +12,7 @@ namespace dlod {
 namespace {
 
 constexpr int kMeasured = 7;
+constexpr double kGrowthDoubt = 0.5;  // standard deviation of a growth, in itself
 using MeasurementCovariance = Eigen::Matrix<double, kMeasured, kMeasured>;
 
 MeasurementCovariance noise_of(const BoxMeasurement& m) {
@@ -105,10 +106,19 @@ void KalmanFilter::align_axes(double reference_yaw_rad) {
 
 void KalmanFilter::grow(double front_m, double back_m, double left_m, double right_m) {
     const Eigen::Vector2d along(std::cos(state_(kYaw)), std::sin(state_(kYaw)));
-    const Eigen::Vector2d across(-along.y(), along.x());
-    state_.head<2>() += 0.5 * ((front_m - back_m) * along + (left_m - right_m) * across);
-    state_(kLength) += front_m + back_m;
-    state_(kWidth) += left_m + right_m;
+    const auto move_end = [&](double by_m, const Eigen::Vector2d& outwards, Index size) {
+        if (by_m <= 0.0) return;
+        // The other end stays: whatever size is measured later, the middle follows without any motion.
+        State change = State::Zero();
+        change.head<2>() = 0.5 * by_m * outwards;
+        change(size) = by_m;
+        state_ += change;
+        covariance_ += kGrowthDoubt * kGrowthDoubt * change * change.transpose();
+    };
+    move_end(front_m, along, kLength);
+    move_end(back_m, -along, kLength);
+    move_end(left_m, {-along.y(), along.x()}, kWidth);
+    move_end(right_m, {along.y(), -along.x()}, kWidth);
 }
 
 double KalmanFilter::plane_distance2(const Eigen::Vector2d& position_m, double age_s,

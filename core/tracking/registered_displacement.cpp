@@ -180,7 +180,7 @@ RegisteredDisplacement register_displacement(const PointSample& before, const Po
 }
 
 Eigen::Matrix2d velocity_covariance(const RegisteredDisplacement& r, double elapsed_s) {
-    const double fit = kNoise_m * kNoise_m / kIndependent;
+    const double fit = kNoise_m * kNoise_m;
     const double changed = 0.5 * kAcceleration_mps2 * elapsed_s;
     return fit / (elapsed_s * elapsed_s) * (r.normals + 1e-3 * Eigen::Matrix2d::Identity()).inverse() +
            changed * changed * Eigen::Matrix2d::Identity();

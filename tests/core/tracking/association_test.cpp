@@ -39,7 +39,8 @@ struct Scene {
         filters.reserve(1000);
         filters.push_back(settled(x, y));
         ExpectedTrack t;
-        t.visible = person_box(x, y);
+        t.visible = t.whole = person_box(x, y);
+        t.established = true;
         t.filter = &filters.back();
         t.points = points;
         t.dt_s = 0.1;
@@ -124,8 +125,39 @@ TEST(Association, YoungTracksReachAsFarAsTheFastestObjectsGo) {
     s.detection(2.0, 5);
     EXPECT_EQ(s.solve(), std::vector<int>{-1});
     s.tracks[0].young = true;
+    s.tracks[0].established = false;
     EXPECT_EQ(s.solve(), std::vector<int>{0});
     s.detections[0].visible.center_m.x() = 3.0;
+    EXPECT_EQ(s.solve(), std::vector<int>{-1});
+}
+
+// An object whose half was hidden is seen whole again: both halves' tracks overlap it alike.
+TEST(Association, AnEstablishedTrackTakesPrecedenceOverAYoungOne) {
+    Scene s;
+    s.track(0.15, 5);
+    s.track(-0.1, 5);
+    s.tracks[1].established = false;
+    s.detection(0, 5);
+    EXPECT_EQ(s.solve(), (std::vector<int>{0, -1}));
+}
+
+TEST(Association, AnObjectSeenWholeAgainIsRecognisedByItsWholeBox) {
+    Scene s;
+    s.track(0, 5);
+    s.tracks[0].visible.center_m.z() = 0.7;  // only the head was seen
+    s.tracks[0].visible.size_m = {0.2, 0.2, 0.3};
+    s.tracks[0].points = 5;
+    s.track(0.3, 5);
+    s.detection(0, 5);
+    EXPECT_EQ(s.solve(), (std::vector<int>{0, -1}));
+}
+
+TEST(Association, ATrackDoesNotTakeWhatIsFarTooLarge) {
+    Scene s;
+    s.track(0, 5);
+    s.detection(0, 5);
+    s.detections[0].visible.size_m = {4.0, 3.0, 1.7};
+    s.detections[0].visible.center_m.x() = 1.2;
     EXPECT_EQ(s.solve(), std::vector<int>{-1});
 }
 
