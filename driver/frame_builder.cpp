@@ -310,13 +310,13 @@ void FrameBuilder::advance() {
 /// Emits the slot's frame, if it has one, and makes the slot free.
 void FrameBuilder::close(Slot& slot) {
     count_lost_packets(slot);
-    joined_in_turn_ = false;
     if (slot.dropped) {
         ++counters_.dropped_frames;
     } else {
         finish(*slot.frame, slot, &slot == slots_.data() ? frame_id_ : frame_id_ + 1);
         emit_(slot.frame);
     }
+    joined_in_turn_ = false;
     closed_columns_.swap(slot.columns);
     std::fill(slot.columns.begin(), slot.columns.end(), kMissing);
     slot.frame = nullptr;
@@ -356,7 +356,7 @@ void FrameBuilder::finish(Frame& frame, const Slot& slot, std::uint32_t frame_id
     }
     ++counters_.frames;
     if (header.valid_columns < window_columns_) ++counters_.incomplete_frames;
-    if (!header.usable) ++counters_.unusable_frames;
+    if (!header.usable && !joined_in_turn_) ++counters_.unusable_frames;
 }
 
 void FrameBuilder::check_clock(std::uint32_t frame_id) {

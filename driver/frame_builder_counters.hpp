@@ -34,7 +34,7 @@ struct FrameBuilderCounters {
 
     Counter frames;             ///< emitted
     Counter incomplete_frames;  ///< of frames: with gaps
-    Counter unusable_frames;    ///< of frames: too few valid columns for odometry
+    Counter unusable_frames;    ///< of frames: too few valid columns for odometry (not where a stream was joined)
     Counter lost_frames;        ///< nothing of them arrived
     Counter dropped_frames;     ///< arrived when no free frame was there
 

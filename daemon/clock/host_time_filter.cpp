@@ -120,6 +120,13 @@ std::int64_t HostTimeFilter::next_stamp_ns(std::int64_t sensor_ns) {
     return stamp;
 }
 
+HostTimeFilter HostTimeFilter::for_another_sensor() const {
+    HostTimeFilter filter;
+    filter.held_back_ns_ = held_back_ns_;
+    filter.last_stamp_ns_ = last_stamp_ns_;
+    return filter;
+}
+
 HostTimeFilter::Step HostTimeFilter::take_step() {
     const Step step = step_;
     step_ = {};

@@ -33,6 +33,9 @@ class HostTimeFilter {
     /// As to_host_ns, and later than every result before it: for the stamps of successive frames.
     std::int64_t next_stamp_ns(std::int64_t sensor_ns);
 
+    /// A filter for a sensor with another clock, whose stamps go on where this one's end.
+    HostTimeFilter for_another_sensor() const;
+
     bool ready() const { return initialized_; }
     Step take_step();
     double drift_ppm() const { return slope_ * 1e6; }

@@ -3,6 +3,11 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <iterator>
+#include <string_view>
+#include <utility>
+
 #include "daemon/service/thread_setup.hpp"
 
 namespace dlod::daemon {
@@ -38,19 +43,23 @@ PipelineOptions pipeline_options(const PipelineConfig& config) {
             }};
 }
 
-std::unique_ptr<RecordingSource> make_recording(const RecordingConfig& config, driver::PacketSource& socket,
-                                                const std::string& metadata) {
-    return config.folder.empty() ? nullptr : std::make_unique<RecordingSource>(socket, config, metadata);
-}
-
 std::unique_ptr<LcmBus> make_bus(const LcmConfig& config) {
     return config.url == "none" ? nullptr : std::make_unique<LcmBus>(config.url);
 }
 
-std::unique_ptr<ResultWriter> make_writer(const OutputConfig& config) {
+/// Each session has a folder of its own: one that another sensor ended keeps its results.
+std::unique_ptr<ResultWriter> make_writer(const OutputConfig& config, std::uint64_t sessions_before) {
     if (config.folder.empty()) return nullptr;
-    return std::make_unique<ResultWriter>(config.folder, static_cast<TimingClock>(config.timing));
+    const std::string suffix = sessions_before == 0 ? "" : fmt::format("-{}", sessions_before + 1);
+    return std::make_unique<ResultWriter>(config.folder + suffix, static_cast<TimingClock>(config.timing));
 }
+
+/// No packet for so long: the sensor is asked why.
+constexpr std::int64_t kSilence_ns = 2'000'000'000;
+/// Packets that do not fit the metadata, or whose sensor has started anew: it may be another one.
+constexpr std::string_view kUnfitCounters[] = {"wrong_size_packets", "wrong_type_packets", "foreign_packets",
+                                               "unusable_frames",    "restarts",           "frame_id_jumps",
+                                               "clock_jumps"};
 
 std::int64_t monotonic_ns() {
     return StepTimer::now_ns(CLOCK_MONOTONIC);
@@ -58,19 +67,22 @@ std::int64_t monotonic_ns() {
 
 }  // namespace
 
-LiveSession::LiveSession(const Config& config, const driver::SensorInfo& sensor, const std::string& metadata)
+LiveSession::LiveSession(const Config& config, const driver::SensorInfo& sensor, const std::string& metadata,
+                         const LiveStart& start)
     : config_(config),
       description_(describe(sensor)),
+      start_(start),
       socket_(udp_options(config.sensor, sensor)),
-      recording_(make_recording(config.recording, socket_, metadata)),
+      recording_(socket_, config.recording, metadata),
       bus_(make_bus(config.lcm)),
       publisher_(bus_ ? std::make_unique<FramePublisher>(*bus_, sensor.model, config.extrinsics.T_base_sensor(),
                                                          config.lcm.channel_prefix)
                       : nullptr),
       status_sender_(bus_ ? std::make_unique<MessageSender>(*bus_) : nullptr),
-      writer_(make_writer(config.output)),
-      board_(DLOD_VERSION, description_, monotonic_ns()),
-      pipeline_(sensor, config.method, config.frames, source(), sinks(), pipeline_options(config.pipeline)) {}
+      writer_(make_writer(config.output, start.sessions_before)),
+      host_time_(start.host_time),
+      board_(DLOD_VERSION, description_, start.start_ns),
+      pipeline_(sensor, config.method, config.frames, recording_, sinks(), pipeline_options(config.pipeline)) {}
 
 FrameSinks LiveSession::sinks() {
     return {.publish = [this](PipelineFrame& frame) { publish(frame); },
@@ -120,21 +132,53 @@ CounterList LiveSession::counters() {
     const driver::CounterVisitor collect = [&](std::string_view name, std::uint64_t value) {
         counters.emplace_back(name, value);
     };
-    source().visit_counters(collect);
+    recording_.visit_counters(collect);
     pipeline_.ingest().counters().visit(collect);
     collect("pipeline_dropped_frames", pipeline_.dropped_frames());
     if (publisher_) collect("lcm_failed", publisher_->failed() + status_sender_->failed());
     collect("output_failures", output_failures_.value());
+    collect("sensor_changes", start_.sessions_before);
     return counters;
 }
 
-void LiveSession::report() {
-    const auto& status = board_.compose(counters(), pipeline_.ingest().last_packet_ns(), monotonic_ns(),
-                                        StepTimer::now_ns(CLOCK_REALTIME) / 1000);
+void LiveSession::report(const std::string& sensor_trouble) {
+    const CounterList totals = counters();
+    const std::int64_t now_ns = monotonic_ns();
+    board_.set_sensor_trouble(sensor_trouble);
+    const auto& status =
+        board_.compose(totals, pipeline_.ingest().last_packet_ns(), now_ns, StepTimer::now_ns(CLOCK_REALTIME) / 1000);
     if (status_sender_) status_sender_->send(config_.lcm.channel_prefix + "STATUS", status);
     service_.status(board_.one_line());
     log_health(status);
+    judge_stream(totals, now_ns);
     if (pipeline_.moves_on()) service_.watchdog();
+}
+
+void LiveSession::judge_stream(const CounterList& counters, std::int64_t now_ns) {
+    std::uint64_t unfit = 0;
+    for (const auto& [name, value] : counters) {
+        if (std::find(std::begin(kUnfitCounters), std::end(kUnfitCounters), name) != std::end(kUnfitCounters)) {
+            unfit += value;
+        }
+    }
+    const std::int64_t last_ns = pipeline_.ingest().last_packet_ns();
+    if (last_ns == 0 || now_ns - last_ns > kSilence_ns) {
+        stream_ = SensorWatch::Stream::kSilent;
+    } else {
+        stream_ = unfit > unfit_packets_ ? SensorWatch::Stream::kUnfit : SensorWatch::Stream::kGood;
+    }
+    unfit_packets_ = unfit;
+}
+
+void LiveSession::configure(const Config& config) {
+    if (config.recording != config_.recording) recording_.configure(config.recording);
+    config_ = config;
+}
+
+LiveStart LiveSession::next_start() const {
+    return {.start_ns = start_.start_ns,
+            .sessions_before = start_.sessions_before + 1,
+            .host_time = host_time_.for_another_sensor()};
 }
 
 void LiveSession::log_health(const status_t& status) {

@@ -12,6 +12,7 @@
 #include "daemon/publish/frame_publisher.hpp"
 #include "daemon/publish/lcm_bus.hpp"
 #include "daemon/recorder/recording_source.hpp"
+#include "daemon/sensor/sensor_watch.hpp"
 #include "daemon/service/log.hpp"
 #include "daemon/service/notifier.hpp"
 #include "daemon/status/status_board.hpp"
@@ -19,11 +20,19 @@
 
 namespace dlod::daemon {
 
+/// What one session takes over from the one before.
+struct LiveStart {
+    std::int64_t start_ns = 0;          ///< CLOCK_MONOTONIC of the service's start
+    std::uint64_t sessions_before = 0;  ///< each was ended by the sensor's becoming another one
+    HostTimeFilter host_time = {};      ///< so that utime never goes back
+};
+
 class LiveSession {
   public:
     /// Opens sockets, LCM and files. @param metadata as the sensor gave it, for the recording
     /// @throws driver::SourceError, MessageBusError, OutputError
-    LiveSession(const Config& config, const driver::SensorInfo& sensor, const std::string& metadata);
+    LiveSession(const Config& config, const driver::SensorInfo& sensor, const std::string& metadata,
+                const LiveStart& start);
 
     void start();
     /// Ends the reception; what was received is still processed.
@@ -31,29 +40,39 @@ class LiveSession {
     bool done() const { return pipeline_.done(); }
     int done_descriptor() const { return pipeline_.done_descriptor(); }
     /// Once a second: status message, systemd's status line and watchdog, log where the health changes.
-    void report();
+    /// @param sensor_trouble what the sensor itself says is wrong; empty: nothing
+    void report(const std::string& sensor_trouble);
+    /// How the packets were doing between the last two reports.
+    SensorWatch::Stream stream() const { return stream_; }
+    /// Takes over what can change while it runs.
+    void configure(const Config& config);
     /// After done(): rethrows what has failed, writes what is written at the end.
     void finish();
+    /// After finish(): for the session that follows.
+    LiveStart next_start() const;
     std::string one_line() const { return board_.one_line(); }
 
   private:
-    driver::PacketSource& source() { return recording_ ? static_cast<driver::PacketSource&>(*recording_) : socket_; }
     FrameSinks sinks();
     void publish(const PipelineFrame& frame);
     void write(PipelineFrame& frame);
     CounterList counters();
     void report_clock_step();
     void log_health(const status_t& status);
+    void judge_stream(const CounterList& counters, std::int64_t now_ns);
 
     Config config_;
     std::string description_;
+    LiveStart start_;
     driver::UdpSource socket_;
-    std::unique_ptr<RecordingSource> recording_;
+    RecordingSource recording_;
     std::unique_ptr<LcmBus> bus_;
     std::unique_ptr<FramePublisher> publisher_;
     std::unique_ptr<MessageSender> status_sender_;
     std::unique_ptr<ResultWriter> writer_;
     HostTimeFilter host_time_;
+    SensorWatch::Stream stream_ = SensorWatch::Stream::kSilent;
+    std::uint64_t unfit_packets_ = 0;  ///< as of the last report
     StatusBoard board_;
     RepeatedWarnings warnings_;
     ServiceNotifier service_;

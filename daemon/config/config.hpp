@@ -61,7 +61,8 @@ struct SensorConfig {
                "address or address:port to which every packet taken is sent on; empty: nowhere");
         v.parameter("receive_buffer_bytes", receive_buffer_bytes, Range{65'536, 1'000'000'000}, "byte",
                     "socket receive buffer to ask for; net.core.rmem_max bounds what the kernel grants");
-        v.group("configure", configure, "set on the sensor at the start, which restarts its stream; needs sensor.host");
+        v.group("configure", configure,
+                "set on the sensor where not in force, which restarts its stream; needs sensor.host");
     }
 };
 

@@ -13,6 +13,8 @@ struct RecordingConfig {
     int files = 10;
     int buffer_megabytes = 32;
 
+    friend bool operator==(const RecordingConfig&, const RecordingConfig&) = default;
+
     template <class V>
     void visit(V& v) {
         v.text("folder", folder,

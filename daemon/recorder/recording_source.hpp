@@ -1,68 +1,34 @@
-// Records what passes from a source to the pipeline, without holding it up.
+// Records what passes from a source to the pipeline.
 #pragma once
 
-#include <atomic>
-#include <boost/lockfree/spsc_queue.hpp>
-#include <condition_variable>
+#include <memory>
 #include <mutex>
-#include <optional>
 #include <string>
-#include <thread>
-#include <vector>
 
-#include "daemon/recorder/recording_config.hpp"
-#include "driver/capture_rotation.hpp"
+#include "daemon/recorder/recording.hpp"
 #include "driver/packet_source.hpp"
 
 namespace dlod::daemon {
 
-/// Hands on another source's batches and copies them to a thread that writes them to disk. The copy is all that it
-/// costs the caller: when the disk is too slow or full, packets are missing from the recording, counted and reported.
+/// Hands on another source's batches, and copies to the recording while there is one.
 class RecordingSource final : public driver::PacketSource {
   public:
     /// `source` must outlive this. `metadata` is the sensor's, as it came.
-    RecordingSource(driver::PacketSource& source, const RecordingConfig& config, const std::string& metadata);
-    /// Writes what still waits, then closes the file.
-    ~RecordingSource() override;
+    RecordingSource(driver::PacketSource& source, const RecordingConfig& config, std::string metadata);
+
+    /// Ends the recording, and begins a new one where the configuration names a folder. From any thread.
+    void configure(const RecordingConfig& config);
 
     driver::PacketBatch next() override;
     void stop() noexcept override { source_.stop(); }
-    /// The source's and the recording's own.
+    /// The source's and the recording's own; from any thread.
     void visit_counters(const driver::CounterVisitor& visit) const override;
 
   private:
-    struct Header {
-        std::int64_t receive_ns = 0;
-        driver::IpAddress sender_address{};
-        std::uint16_t sender_port = 0;
-        std::uint16_t destination_port = 0;
-        std::uint32_t bytes = 0;
-    };
-
-    void enqueue(const driver::Packet& packet);
-    void write_until_stopped();
-    void write_waiting();
-    void report_trouble();
-
     driver::PacketSource& source_;
-    driver::Counter recorded_;
-    driver::Counter buffer_full_;
-    driver::Counter write_failed_;
-
-    // The writing thread's.
-    driver::CaptureRotation rotation_;
-    std::vector<std::byte> datagram_;
-    std::optional<Header> header_;  // taken from the queue, its bytes not yet
-    bool in_trouble_ = false;
-
-    // Between the threads.
-    boost::lockfree::spsc_queue<std::byte> waiting_;
-    std::mutex mutex_;
-    std::condition_variable stop_requested_;
-    bool stopping_ = false;
-    std::string message_;
-    std::atomic<bool> message_waits_{false};
-    std::thread writer_;
+    std::string metadata_;
+    mutable std::mutex mutex_;  ///< held while a batch is copied: nobody else holds it for longer than a moment
+    std::unique_ptr<Recording> recording_;
 };
 
 }  // namespace dlod::daemon

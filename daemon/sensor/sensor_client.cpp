@@ -1,9 +1,15 @@
 #include "daemon/sensor/sensor_client.hpp"
 
 #include <httplib.h>
+#include <netdb.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <utility>
+
+#include "driver/network_address.hpp"
 
 namespace dlod::daemon {
 namespace {
@@ -11,6 +17,7 @@ namespace {
 using nlohmann::json;
 
 constexpr const char* kMetadataPath = "/api/v1/sensor/metadata";
+constexpr const char* kActiveSettingsPath = "/api/v1/sensor/cmd/get_config_param?args=active";
 constexpr const char* kConfigPath = "/api/v1/sensor/config?reinit=true&persist=false";
 constexpr std::size_t kMaxAnswer = 4U << 20U;  // metadata are about 10 kB
 
@@ -37,10 +44,29 @@ std::string body_of(const httplib::Result& result, const std::string& host, cons
 }
 
 /// Metadata carry the sensor's state: nested in `sensor_info`, or at the top in the flat form.
-std::string status_of(const json& metadata) {
+std::string state_of(const json& metadata) {
     const json& info = metadata.contains("sensor_info") ? metadata["sensor_info"] : metadata;
     return info.is_object() && info.contains("status") && info["status"].is_string() ? info["status"].get<std::string>()
                                                                                      : "RUNNING";
+}
+
+/// Calls `visit` with the name of each setting in the sensor's API and the member for it.
+template <class Settings, class Visitor>
+void visit_settings(Settings& settings, const Visitor& visit) {
+    visit("udp_dest", settings.udp_dest);
+    visit("udp_port_lidar", settings.lidar_port);
+    visit("udp_port_imu", settings.imu_port);
+    visit("lidar_mode", settings.lidar_mode);
+    visit("udp_profile_lidar", settings.lidar_profile);
+    visit("timestamp_mode", settings.timestamp_mode);
+}
+
+json to_json(const SensorSettings& settings) {
+    json body = json::object();
+    visit_settings(settings, [&](const char* name, const auto& setting) {
+        if (setting) body[name] = *setting;
+    });
+    return body;
 }
 
 }  // namespace
@@ -56,23 +82,96 @@ std::string SensorClient::fetch_metadata() const {
         throw SensorError("sensor " + host_ + ": GET " + kMetadataPath +
                           ": no JSON object (is sensor.host an Ouster?)");
     }
-    const std::string status = status_of(metadata);
+    const std::string status = state_of(metadata);
     if (status != "RUNNING" && status != "STANDBY") {
         throw SensorError("sensor " + host_ + " is not ready yet: its status is " + status);
     }
     return text;
 }
 
-void SensorClient::apply(const SensorSettings& settings) const {
-    json body = json::object();
-    if (settings.udp_dest) body["udp_dest"] = *settings.udp_dest;
-    if (settings.lidar_port) body["udp_port_lidar"] = *settings.lidar_port;
-    if (settings.imu_port) body["udp_port_imu"] = *settings.imu_port;
-    if (settings.lidar_mode) body["lidar_mode"] = *settings.lidar_mode;
-    if (settings.lidar_profile) body["udp_profile_lidar"] = *settings.lidar_profile;
-    if (settings.timestamp_mode) body["timestamp_mode"] = *settings.timestamp_mode;
+SensorSettings SensorClient::fetch_settings() const {
     auto client = connect(host_, timeout_);
-    body_of(client.Post(kConfigPath, body.dump(), "application/json"), host_, std::string("POST ") + kConfigPath);
+    const std::string text = body_of(client.Get(kActiveSettingsPath), host_, std::string("GET ") + kActiveSettingsPath);
+    const json answer = json::parse(text, nullptr, /*allow_exceptions=*/false);
+    SensorSettings settings;
+    if (!answer.is_object()) return settings;
+    visit_settings(settings, [&](const char* name, auto& setting) {
+        using Value = typename std::remove_reference_t<decltype(setting)>::value_type;
+        if (!answer.contains(name)) return;
+        const json& value = answer[name];
+        if constexpr (std::is_same_v<Value, std::string>) {
+            if (value.is_string()) setting = value.template get<std::string>();
+        } else {
+            if (value.is_number_unsigned()) setting = value.template get<Value>();
+        }
+    });
+    // Firmware before 2.0 calls it so.
+    if (!settings.udp_dest && answer.contains("udp_ip") && answer["udp_ip"].is_string()) {
+        settings.udp_dest = answer["udp_ip"].get<std::string>();
+    }
+    return settings;
+}
+
+std::string SensorClient::own_address() const {
+    std::string name = host_;
+    if (!name.empty() && name.front() == '[') {
+        name = name.substr(1, name.find(']') - 1);
+    } else if (const auto colon = name.find(':'); colon == name.rfind(':')) {
+        name = name.substr(0, colon);
+    }
+    addrinfo hints{};
+    hints.ai_socktype = SOCK_DGRAM;
+    addrinfo* first = nullptr;
+    if (::getaddrinfo(name.c_str(), "80", &hints, &first) != 0) return "";
+    const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> found(first, &::freeaddrinfo);
+    const int fd = ::socket(found->ai_family, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    if (fd < 0) return "";
+    // Nothing is sent: the kernel only looks up the route.
+    sockaddr_storage local{};
+    socklen_t length = sizeof local;
+    const bool routed = ::connect(fd, found->ai_addr, found->ai_addrlen) == 0 &&
+                        ::getsockname(fd, reinterpret_cast<sockaddr*>(&local), &length) == 0;
+    ::close(fd);
+    return routed ? driver::to_string(driver::from_socket_address(local).address) : "";
+}
+
+void SensorClient::apply(const SensorSettings& settings) const {
+    auto client = connect(host_, timeout_);
+    body_of(client.Post(kConfigPath, to_json(settings).dump(), "application/json"), host_,
+            std::string("POST ") + kConfigPath);
+}
+
+SensorSettings difference(const SensorSettings& wanted, const SensorSettings& active, const std::string& own_address) {
+    SensorSettings missing;
+    const json in_force = to_json(active);
+    const json asked = to_json(wanted);
+    visit_settings(missing, [&](const char* name, auto& setting) {
+        using Value = typename std::remove_reference_t<decltype(setting)>::value_type;
+        if (!asked.contains(name)) return;
+        if (in_force.contains(name)) {
+            const bool means_this_host = asked[name] == "@auto";
+            if (in_force[name] == asked[name] || (means_this_host && in_force[name] == own_address)) return;
+        }
+        setting = asked[name].template get<Value>();
+    });
+    return missing;
+}
+
+std::string describe_difference(const SensorSettings& missing, const SensorSettings& active) {
+    const auto text_of = [](const json& value) { return value.is_string() ? value.get<std::string>() : value.dump(); };
+    const json asked = to_json(missing);
+    const json in_force = to_json(active);
+    std::string text;
+    for (const auto& [name, value] : asked.items()) {
+        text += (text.empty() ? "" : ", ") + name + " " +
+                (in_force.contains(name) ? text_of(in_force[name]) : "something") + " instead of " + text_of(value);
+    }
+    return text;
+}
+
+std::string status_of(const std::string& metadata) {
+    const json parsed = json::parse(metadata, nullptr, /*allow_exceptions=*/false);
+    return parsed.is_object() ? state_of(parsed) : "RUNNING";
 }
 
 }  // namespace dlod::daemon

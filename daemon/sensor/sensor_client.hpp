@@ -16,7 +16,7 @@ class SensorError : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-/// What to set on the sensor; only what has a value is sent.
+/// What to set on the sensor, or what is in force there; only what has a value is sent or known.
 struct SensorSettings {
     std::optional<std::string> udp_dest;  ///< address, or "@auto": the host that asks
     std::optional<std::uint16_t> lidar_port;
@@ -30,6 +30,15 @@ struct SensorSettings {
     }
 };
 
+/// What of `wanted` is not in force in `active`.
+/// @param own_address of this host as the sensor sees it: what the destination "@auto" stands for
+SensorSettings difference(const SensorSettings& wanted, const SensorSettings& active, const std::string& own_address);
+/// In words: "udp_dest 10.0.0.9 instead of @auto, lidar_mode 512x10 instead of 1024x10".
+std::string describe_difference(const SensorSettings& missing, const SensorSettings& active);
+
+/// The state that metadata carry, "RUNNING" where they carry none.
+std::string status_of(const std::string& metadata);
+
 /// One request, one connection: the sensor may be unplugged between any two. Blocks for at most the timeout a request.
 class SensorClient {
   public:
@@ -39,6 +48,13 @@ class SensorClient {
     /// The metadata JSON of GET /api/v1/sensor/metadata.
     /// @throws SensorError when the sensor does not answer, answers with an error, or is still starting
     std::string fetch_metadata() const;
+
+    /// What is in force of the settings (GET /api/v1/sensor/cmd/get_config_param?args=active).
+    /// @throws SensorError
+    SensorSettings fetch_settings() const;
+
+    /// This host's address on the way to the sensor; empty where none leads there.
+    std::string own_address() const;
 
     /// Makes the settings take effect (POST /api/v1/sensor/config?reinit=true&persist=false). The sensor restarts its
     /// stream; nothing survives its next power cycle.

@@ -32,6 +32,10 @@ class StatusBoard {
     const status_t& compose(const CounterList& counters, std::int64_t last_packet_ns, std::int64_t now_ns,
                             std::int64_t utime);
 
+    /// What is wrong with the sensor by its own account, for the health from now on; empty: nothing. On the thread of
+    /// compose().
+    void set_sensor_trouble(std::string trouble) { sensor_trouble_ = std::move(trouble); }
+
     /// The composed status in one line.
     std::string one_line() const;
 
@@ -47,6 +51,7 @@ class StatusBoard {
     std::map<std::string, std::uint64_t> previous_counters_;
     std::map<std::string, std::int64_t> rose_ns_;  ///< when a counter of losses was last seen to have risen
     std::uint64_t previous_poses_ = 0;
+    std::string sensor_trouble_;
     status_t status_{};
 
     std::mutex mutex_;  ///< guards the rest, which workers write

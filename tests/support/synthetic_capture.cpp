@@ -18,11 +18,10 @@ namespace {
 
 constexpr int kColumnsPerPacket = 16;
 constexpr double kFramePeriod = 0.1;
-constexpr std::int64_t kStart = 1'700'000'000'000'000'000;
 constexpr const char* kProfile = "RNG15_RFL8_NIR8";
 
-double altitude_deg(int row) {
-    return 22.0 - 44.0 * row / (SyntheticCapture::kRows - 1);
+double altitude_deg(const SyntheticSensor& sensor, int row) {
+    return 22.0 - 44.0 * row / (sensor.rows - 1);
 }
 
 /// Distance along the ray to the hall's walls, floor or the walking person; the ray's origin is inside.
@@ -58,26 +57,27 @@ double range_m(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, 
     return nearest;
 }
 
-std::vector<std::byte> lidar_packet(const driver::PacketLayout& layout, int frame, int first_column) {
+std::vector<std::byte> lidar_packet(const driver::PacketLayout& layout, const SyntheticSensor& sensor, int frame,
+                                    int first_column) {
     std::vector<std::byte> data(layout.packet_bytes());
     driver::PacketHeader packet_header;
     packet_header.frame_id = static_cast<std::uint32_t>(frame);
-    packet_header.init_id = 7;
-    packet_header.serial_number = 123456;
+    packet_header.init_id = sensor.init_id;
+    packet_header.serial_number = sensor.serial_number;
     layout.write_packet_header(data, packet_header);
     for (int i = 0; i < kColumnsPerPacket; ++i) {
         const int m = first_column + i;
-        const double time_s = kFramePeriod * (frame + static_cast<double>(m) / SyntheticCapture::kColumns);
+        const double time_s = kFramePeriod * (frame + static_cast<double>(m) / sensor.columns);
         driver::ColumnHeader header;
-        header.time_ns = static_cast<std::uint64_t>(kStart + static_cast<std::int64_t>(1e9 * time_s));
+        header.time_ns = static_cast<std::uint64_t>(sensor.epoch_ns + static_cast<std::int64_t>(1e9 * time_s));
         header.measurement_id = static_cast<std::uint16_t>(m);
         header.status = layout.valid_status();
         layout.write_column_header(data, i, header);
         // The sensor's axes are the lidar's: the metadata's transform is the identity.
-        const double theta = 2.0 * std::numbers::pi * (1.0 - static_cast<double>(m) / SyntheticCapture::kColumns);
-        const Eigen::Vector3d origin(time_s, 0.05 * std::sin(time_s), 0.0);
-        for (int row = 0; row < SyntheticCapture::kRows; ++row) {
-            const double phi = altitude_deg(row) * std::numbers::pi / 180.0;
+        const double theta = 2.0 * std::numbers::pi * (1.0 - static_cast<double>(m) / sensor.columns);
+        const Eigen::Vector3d origin(sensor.speed_mps * time_s, 0.05 * std::sin(time_s), 0.0);
+        for (int row = 0; row < sensor.rows; ++row) {
+            const double phi = altitude_deg(sensor, row) * std::numbers::pi / 180.0;
             const Eigen::Vector3d direction(std::cos(theta) * std::cos(phi), std::sin(theta) * std::cos(phi),
                                             std::sin(phi));
             const double range = range_m(origin, direction, time_s);
@@ -90,52 +90,54 @@ std::vector<std::byte> lidar_packet(const driver::PacketLayout& layout, int fram
 
 }  // namespace
 
-SyntheticCapture::SyntheticCapture(int frames) {
-    const driver::PacketLayout layout(*driver::find_packet_format(kProfile), kRows, kColumnsPerPacket);
-    for (int frame = 0; frame < frames; ++frame) {
-        for (int m = 0; m < kColumns; m += kColumnsPerPacket) {
-            const double time_s = kFramePeriod * (frame + static_cast<double>(m + kColumnsPerPacket - 1) / kColumns);
-            packets_.push_back(
-                {lidar_packet(layout, frame, m), kStart + static_cast<std::int64_t>(1e9 * time_s), kLidarPort});
+SyntheticCapture::SyntheticCapture(int frames, const SyntheticSensor& sensor) {
+    const driver::PacketLayout layout(*driver::find_packet_format(kProfile), sensor.rows, kColumnsPerPacket);
+    for (int frame = sensor.first_frame; frame < sensor.first_frame + frames; ++frame) {
+        for (int m = 0; m < sensor.columns; m += kColumnsPerPacket) {
+            const double time_s =
+                kFramePeriod * (frame + static_cast<double>(m + kColumnsPerPacket - 1) / sensor.columns);
+            packets_.push_back({lidar_packet(layout, sensor, frame, m),
+                                sensor.epoch_ns + static_cast<std::int64_t>(1e9 * time_s), sensor.lidar_port});
         }
     }
-    for (int i = 0; i < 10 * frames; ++i) {
+    for (int i = 10 * sensor.first_frame; i < 10 * (sensor.first_frame + frames); ++i) {
         const double time_s = 0.01 * i;
         ImuSample sample;
-        sample.stamp_ns = kStart + static_cast<std::int64_t>(1e9 * time_s);
+        sample.stamp_ns = sensor.epoch_ns + static_cast<std::int64_t>(1e9 * time_s);
         sample.acceleration_mps2 = Eigen::Vector3f(0.0F, static_cast<float>(-0.05 * std::sin(time_s)), 9.80665F);
         std::vector<std::byte> data(driver::kLegacyImuPacketBytes);
         driver::encode_imu_packet(data, sample, sample.stamp_ns);
-        packets_.push_back({std::move(data), sample.stamp_ns, kImuPort});
+        packets_.push_back({std::move(data), sample.stamp_ns, sensor.imu_port});
     }
     std::stable_sort(packets_.begin(), packets_.end(),
                      [](const auto& a, const auto& b) { return a.time_ns < b.time_ns; });
 }
 
-std::string SyntheticCapture::metadata() {
-    std::vector<double> altitude(kRows);
-    for (int row = 0; row < kRows; ++row) altitude[static_cast<std::size_t>(row)] = altitude_deg(row);
+std::string SyntheticCapture::metadata(const SyntheticSensor& sensor) {
+    std::vector<double> altitude(static_cast<std::size_t>(sensor.rows));
+    for (int row = 0; row < sensor.rows; ++row) altitude[static_cast<std::size_t>(row)] = altitude_deg(sensor, row);
     const std::vector<double> identity = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
     const nlohmann::json json = {{"beam_altitude_angles", altitude},
-                                 {"beam_azimuth_angles", std::vector<double>(kRows, 0.0)},
+                                 {"beam_azimuth_angles", std::vector<double>(altitude.size(), 0.0)},
                                  {"data_format",
-                                  {{"column_window", {0, kColumns - 1}},
-                                   {"columns_per_frame", kColumns},
+                                  {{"column_window", {0, sensor.columns - 1}},
+                                   {"columns_per_frame", sensor.columns},
                                    {"columns_per_packet", kColumnsPerPacket},
-                                   {"pixel_shift_by_row", std::vector<int>(kRows, 0)},
-                                   {"pixels_per_column", kRows},
+                                   {"pixel_shift_by_row", std::vector<int>(altitude.size(), 0)},
+                                   {"pixels_per_column", sensor.rows},
                                    {"udp_profile_imu", "LEGACY"},
                                    {"udp_profile_lidar", kProfile}}},
-                                 {"image_rev", "ousteros-image-prod-aries-v2.3.0"},
+                                 {"build_rev", sensor.firmware},
                                  {"imu_to_sensor_transform", identity},
-                                 {"initialization_id", 7},
-                                 {"lidar_mode", "512x10"},
+                                 {"initialization_id", sensor.init_id},
+                                 {"lidar_mode", std::to_string(sensor.columns) + "x10"},
                                  {"lidar_origin_to_beam_origin_mm", 0.0},
                                  {"lidar_to_sensor_transform", identity},
-                                 {"prod_line", "OS-0-32"},
-                                 {"prod_sn", "123456"},
-                                 {"udp_port_imu", kImuPort},
-                                 {"udp_port_lidar", kLidarPort}};
+                                 {"prod_line", "OS-0-" + std::to_string(sensor.rows)},
+                                 {"prod_sn", std::to_string(sensor.serial_number)},
+                                 {"status", sensor.status},
+                                 {"udp_port_imu", sensor.imu_port},
+                                 {"udp_port_lidar", sensor.lidar_port}};
     return json.dump(1);
 }
 

@@ -16,8 +16,23 @@ struct SyntheticPacket {
     std::uint16_t port = 0;
 };
 
-/// A sensor of 32 x 512 pixels at 10 Hz drives at 1 m/s through a hall in which a person walks; every column is fired
-/// from where the sensor is at that moment. Profile RNG15_RFL8_NIR8, IMU at 100 Hz.
+/// What a synthetic sensor says of itself, and what its drive is like.
+struct SyntheticSensor {
+    int rows = 32;
+    int columns = 512;
+    std::uint64_t serial_number = 123456;
+    std::uint32_t init_id = 7;
+    std::string firmware = "v2.3.0";
+    std::string status = "RUNNING";
+    std::uint16_t lidar_port = 7502;
+    std::uint16_t imu_port = 7503;
+    std::int64_t epoch_ns = 1'700'000'000'000'000'000;  ///< its clock when frame 0 begins
+    int first_frame = 0;                                ///< of the capture
+    double speed_mps = 1.0;                             ///< along the hall, 24 m from its one end to the other
+};
+
+/// A sensor, of 32 x 512 pixels unless said otherwise, at 10 Hz drives at 1 m/s through a hall in which a person walks;
+/// every column is fired from where the sensor is at that moment. Profile RNG15_RFL8_NIR8, IMU at 100 Hz.
 class SyntheticCapture {
   public:
     static constexpr int kRows = 32;
@@ -25,11 +40,11 @@ class SyntheticCapture {
     static constexpr std::uint16_t kLidarPort = 7502;
     static constexpr std::uint16_t kImuPort = 7503;
 
-    explicit SyntheticCapture(int frames);
+    explicit SyntheticCapture(int frames, const SyntheticSensor& sensor = {});
 
     /// In order of time.
     const std::vector<SyntheticPacket>& packets() const { return packets_; }
-    static std::string metadata();
+    static std::string metadata(const SyntheticSensor& sensor = {});
     /// Writes drive.pcap and drive.json into the folder; returns the capture's path.
     std::filesystem::path write(const std::filesystem::path& folder) const;
 

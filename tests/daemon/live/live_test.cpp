@@ -3,13 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
-#include <csignal>
-#include <fstream>
+#include <filesystem>
+#include <string>
 
-#include "tests/support/child_process.hpp"
-#include "tests/support/live_subscriber.hpp"
-#include "tests/support/notify_socket.hpp"
-#include "tests/support/synthetic_capture.hpp"
+#include "tests/daemon/live/live_run.hpp"
 
 namespace dlod {
 namespace {
@@ -17,46 +14,36 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr std::size_t kFrames = 40;
-constexpr const char* kUrl = "udpm://239.255.76.99:17667?ttl=0";
-constexpr const char* kPort = "17502";  // and the next one for the IMU
 
 TEST(Live, NoFrameIsLostFromPacketToSubscriber) {
 #ifndef DLOD_SIM_BINARY
     GTEST_SKIP() << "the simulator is not built";
 #else
-    const test::TemporaryFolder folder;
-    if (!test::enter_network_namespace()) GTEST_LOG_(INFO) << "no namespace of its own: on the host's loopback";
-    const test::LiveSubscriber subscriber(kUrl, "TEST_");
-    if (!subscriber.good()) GTEST_SKIP() << "no multicast here";
-    test::NotifySocket systemd(folder.path());
+    test::LiveRun run;
+    if (!run.usable()) GTEST_SKIP() << "no multicast here";
     // A drive of one frame, for the sensor's metadata.
-    test::ChildProcess sensor({DLOD_SIM_BINARY, "square", "--frames", "1", "--out", folder.path()});
+    test::ChildProcess sensor({DLOD_SIM_BINARY, "square", "--frames", "1", "--out", run.folder.path()});
     ASSERT_EQ(sensor.wait(30s), 0) << sensor.output();
-    std::ofstream(folder.path() / "dlod.yaml")
-        << "sensor: {metadata: " << (folder.path() / "square.json").string() << ", lidar_port: 17502, imu_port: 17503, "
-        << "sender: 127.0.0.1}\n"
-        << "lcm: {channel_prefix: TEST_, url: \"" << kUrl << "\"}\n";
-    test::ChildProcess daemon(
-        {DLOD_BINARY, "run", "-c", (folder.path() / "dlod.yaml").string(), "--out", (folder.path() / "out").string()},
-        {.environment = {systemd.variable()}, .largest_file = {}});
-    ASSERT_TRUE(systemd.wait_for("READY=1", 10s)) << daemon.output();
+    run.write_config("metadata: " + (run.folder.path() / "square.json").string() +
+                     ", lidar_port: " + std::to_string(test::kLiveLidarPort) +
+                     ", imu_port: " + std::to_string(test::kLiveImuPort) + ", sender: 127.0.0.1");
+    run.start({"--out", (run.folder.path() / "out").string()});
 
-    test::ChildProcess simulator(
-        {DLOD_SIM_BINARY, "square", "--frames", std::to_string(kFrames), "--live", std::string("127.0.0.1:") + kPort});
+    test::ChildProcess simulator({DLOD_SIM_BINARY, "square", "--frames", std::to_string(kFrames), "--live",
+                                  "127.0.0.1:" + std::to_string(test::kLiveLidarPort)});
     ASSERT_EQ(simulator.wait(120s), 0) << simulator.output();
     const auto sent = std::chrono::system_clock::now();
-    EXPECT_TRUE(test::LiveSubscriber::wait_until(5s, [&] { return subscriber.pose_count() >= kFrames; }));
-    EXPECT_TRUE(systemd.wait_for("WATCHDOG=1", 2s)) << "the watchdog is fed while frames flow";
-    systemd.clear();
-    EXPECT_TRUE(systemd.wait_for("STATUS=", 2s)) << "a report that has counted all frames";
-    daemon.signal(SIGTERM);
-    EXPECT_EQ(daemon.wait(2s), 0) << "a clean stop within two seconds\n" << daemon.output();
-    EXPECT_TRUE(systemd.wait_for("STOPPING=1", 1s));
+    EXPECT_TRUE(run.eventually(5s, [&] { return run.subscriber.pose_count() >= kFrames; }));
+    EXPECT_TRUE(run.systemd.wait_for("WATCHDOG=1", 2s)) << "the watchdog is fed while frames flow";
+    run.systemd.clear();
+    EXPECT_TRUE(run.systemd.wait_for("STATUS=", 2s)) << "a report that has counted all frames";
+    run.stop();
 
+    const auto& subscriber = run.subscriber;
     const auto poses = subscriber.poses();
     const auto masks = subscriber.masks();
     const auto tracks = subscriber.tracks();
-    ASSERT_EQ(poses.size(), kFrames) << daemon.output();
+    ASSERT_EQ(poses.size(), kFrames) << run.daemon->output();
     ASSERT_EQ(masks.size(), kFrames);
     ASSERT_EQ(tracks.size(), kFrames);
     const std::int64_t end = std::chrono::duration_cast<std::chrono::microseconds>(sent.time_since_epoch()).count();
@@ -84,7 +71,7 @@ TEST(Live, NoFrameIsLostFromPacketToSubscriber) {
                              "pipeline_dropped_frames", "lcm_failed", "output_failures"}) {
         EXPECT_EQ(test::counter(status, loss), 0) << loss;
     }
-    EXPECT_TRUE(std::filesystem::exists(folder.path() / "out" / "map.pcd")) << "all outputs are complete";
+    EXPECT_TRUE(std::filesystem::exists(run.folder.path() / "out" / "map.pcd")) << "all outputs are complete";
     ASSERT_EQ(status.stage_name.back(), "latency");
     GTEST_LOG_(INFO) << "latency from the last packet's kernel stamp to the message, ms: p50 "
                      << status.stage_p50.back() << ", p99 " << status.stage_p99.back() << ", max "

@@ -1,0 +1,127 @@
+#include "daemon/commands/live_service.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <utility>
+
+#include "daemon/commands/load_config.hpp"
+#include "daemon/commands/reload.hpp"
+#include "daemon/config/option.hpp"
+#include "daemon/pipeline/stage_times.hpp"
+
+namespace dlod::daemon {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
+constexpr auto kReportPeriod = std::chrono::seconds(1);
+/// How long new metadata may wait to be looked for.
+constexpr milliseconds kLookPeriod{100};
+
+/// systemd names the directory; by hand, nothing is kept.
+std::string state_directory() {
+    const char* directory = std::getenv("STATE_DIRECTORY");
+    return directory == nullptr ? "" : directory;
+}
+
+}  // namespace
+
+LiveService::LiveService(const ConfigSources& sources) : sources_(sources), config_(load_config(sources, nullptr)) {
+    set_up_log(config_.log.level);
+    start_.start_ns = StepTimer::now_ns(CLOCK_MONOTONIC);
+    const auto metadata = configured_metadata(config_.sensor);
+    watch_ = std::make_unique<SensorWatch>(config_.sensor, metadata, state_directory());
+}
+
+LiveService::~LiveService() = default;
+
+void LiveService::run() {
+    // A sensor that is still booting is awaited: that is no failure of the service.
+    if (config_.sensor.metadata.empty()) service_.ready("waiting for sensor " + config_.sensor.host);
+    auto next_report = Clock::now() + kReportPeriod;
+    while (!stopping_ || session_) {
+        begin_session_if_asked();
+        const auto left = std::chrono::duration_cast<milliseconds>(next_report - Clock::now());
+        handle(
+            signals_.wait(session_ ? session_->done_descriptor() : -1, std::clamp(left, milliseconds(0), kLookPeriod)));
+        if (session_ && session_->done()) end_session();
+        if (Clock::now() < next_report) continue;
+        next_report += kReportPeriod;
+        report();
+    }
+}
+
+void LiveService::handle(SignalWaiter::Event event) {
+    if (event == SignalWaiter::Event::kStop && !std::exchange(stopping_, true)) {
+        service_.stopping();
+        if (session_) session_->stop();
+    }
+    if (event == SignalWaiter::Event::kReload) reload_config();
+}
+
+void LiveService::reload_config() {
+    service_.reloading();
+    const Reload result = reload(sources_, sensor_ ? &*sensor_ : nullptr, config_);
+    if (!result.error.empty()) {
+        spdlog::error("reload: {}; the running configuration stays in force", result.error);
+    } else {
+        set_up_log(config_.log.level);
+        for (const auto& option : result.changed) spdlog::info("reload: now {}", option);
+        for (const auto& option : result.at_restart) spdlog::warn("reload: at the next restart {}", option);
+        if (result.changed.empty() && result.at_restart.empty()) spdlog::info("reload: nothing has changed");
+        if (!result.changed.empty()) {
+            watch_->configure(config_.sensor);
+            if (session_) session_->configure(config_);
+        }
+    }
+    service_.ready(session_ ? session_->one_line() : waiting_ ? waiting_->one_line() : "waiting for the sensor");
+}
+
+/// The session at work, if any, comes to its end first: what it has received is not lost, and its ports become free.
+void LiveService::begin_session_if_asked() {
+    if (auto metadata = watch_->take_metadata()) {
+        next_metadata_ = std::move(metadata);
+        if (session_) session_->stop();
+    }
+    if (!next_metadata_ || session_ || stopping_) return;
+    waiting_.reset();
+    sensor_ = driver::parse_metadata(next_metadata_->json, next_metadata_->name);
+    for (const auto& warning : sensor_->warnings) spdlog::warn("{}", warning);
+    try {
+        config_ = load_config(sources_, &*sensor_);  // with the preset of this sensor
+    } catch (const ConfigError& error) {
+        spdlog::error("{}; the running configuration stays in force", error.what());
+    }
+    session_ = std::make_unique<LiveSession>(config_, *sensor_, next_metadata_->json, start_);
+    next_metadata_.reset();
+    session_->start();
+}
+
+void LiveService::end_session() {
+    session_->finish();
+    start_ = session_->next_start();
+    session_.reset();
+    // Without the sensor's being another one, only a stop ends a session.
+    if (!next_metadata_) stopping_ = true;
+}
+
+void LiveService::report() {
+    const std::string trouble = watch_->trouble();
+    if (trouble != trouble_ && !trouble.empty()) warnings_.warn(trouble, trouble);
+    trouble_ = trouble;
+    if (session_) {
+        session_->report(trouble);
+        watch_->observe(session_->stream());
+        return;
+    }
+    if (!waiting_) waiting_ = std::make_unique<WaitingStatus>(config_, start_.start_ns);
+    waiting_->report(trouble);
+    service_.status(waiting_->one_line());
+    service_.watchdog();
+}
+
+}  // namespace dlod::daemon

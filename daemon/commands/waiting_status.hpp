@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "daemon/config/config.hpp"
+#include "daemon/publish/lcm_bus.hpp"
+#include "daemon/publish/message_sender.hpp"
+#include "daemon/status/status_board.hpp"
+
+namespace dlod::daemon {
+
+/// The status of a service that has no sensor yet: planners and lcm-spy see that it lives and what it waits for.
+class WaitingStatus {
+  public:
+    /// @param start_ns CLOCK_MONOTONIC of the service's start @throws MessageBusError
+    WaitingStatus(const Config& config, std::int64_t start_ns);
+
+    /// Once a second. @param trouble with the sensor; empty: none known
+    void report(const std::string& trouble);
+    std::string one_line() const { return board_.one_line(); }
+
+  private:
+    std::string channel_;
+    std::unique_ptr<LcmBus> bus_;
+    std::unique_ptr<MessageSender> sender_;
+    StatusBoard board_;
+};
+
+}  // namespace dlod::daemon
