@@ -101,16 +101,18 @@ void VoxelMap::accumulate(std::span<const FixedPoint> points, int sign) {
                                    p.z - (std::int64_t{index.z} * side_ + side_ / 2)};
         const std::int64_t n[3] = {p.nx, p.ny, p.nz};
         const bool disc = p.nx != 0 || p.ny != 0 || p.nz != 0;
-        m.count += sign;
+        const std::int32_t weight = disc ? sign * kFlatWeight : sign;
+        m.points += sign;
+        m.weight += weight;
         for (std::size_t i = 0, k = 0; i < 3; ++i) {
-            m.sum[i] += sign * static_cast<std::int32_t>(d[i]);
+            m.sum[i] += weight * d[i];
             for (std::size_t j = i; j < 3; ++j, ++k) {
                 const std::int64_t own = disc ? disc_ * ((i == j ? kOne : 0) - n[i] * n[j]) / kOne : 0;
-                m.square[k] += sign * (d[i] * d[j] + own);
+                m.square[k] += weight * (d[i] * d[j] + own);
             }
         }
         fitted_[slot] = 0;
-        if (m.count == 0) {
+        if (m.points == 0) {
             free_.push_back(slot);
             slot = kNone;
             --voxel_count_;
@@ -151,9 +153,10 @@ void VoxelMap::fit(std::uint32_t slot) {
     fitted_[slot] = 1;
     const Moments& m = moments_[slot];
     VoxelPlane& plane = planes_[slot];
-    plane.points = static_cast<std::uint32_t>(m.count);
-    const double n = m.count;
-    const Eigen::Vector3d mean = Eigen::Vector3d(m.sum[0], m.sum[1], m.sum[2]) / n;
+    plane.points = static_cast<std::uint32_t>(m.points);
+    const double n = m.weight;
+    const auto sum = [&](std::size_t k) { return static_cast<double>(m.sum[k]); };
+    const Eigen::Vector3d mean = Eigen::Vector3d(sum(0), sum(1), sum(2)) / n;
     const auto at = [&](std::size_t k) { return static_cast<double>(m.square[k]) / n; };
     Eigen::Matrix3d covariance;
     covariance << at(0), at(1), at(2), at(1), at(3), at(4), at(2), at(4), at(5);
@@ -169,7 +172,8 @@ void VoxelMap::fit(std::uint32_t slot) {
     plane.thickness_m = static_cast<float>(std::max(deviation[0], config_.noise_m));
     plane.extent_m[0] = static_cast<float>(deviation[2]);
     plane.extent_m[1] = static_cast<float>(deviation[1]);
-    plane.flat = m.count >= config_.min_points && deviation[0] <= config_.max_thickness_m && deviation[0] <= 0.5 * deviation[1];
+    plane.flat = m.weight >= config_.min_points * kFlatWeight && deviation[0] <= config_.max_thickness_m &&
+                 deviation[0] <= 0.5 * deviation[1];
 }
 
 }  // namespace dlod

@@ -21,7 +21,7 @@ namespace dlod {
 struct VoxelMapConfig {
     double voxel_m = 0.5;
     double surfel_radius_m = 0.1;
-    int min_points = 2;
+    int min_points = 1;
     double max_thickness_m = 0.06;
     double noise_m = 0.006;
 
@@ -31,7 +31,8 @@ struct VoxelMapConfig {
                     "side of a voxel; larger bridges sparser scans and rounds off detail");
         v.parameter("surfel_radius_m", surfel_radius_m, Range{0.0, 2.0}, "m",
                     "a point counts as a disc of this radius: its normal speaks while points are few");
-        v.parameter("min_points", min_points, Range{1, 100}, "points", "a voxel with fewer is not flat");
+        v.parameter("min_points", min_points, Range{1, 100}, "points",
+                    "a voxel with fewer that have a normal is not flat; 16 without count as one with");
         v.parameter("max_thickness_m", max_thickness_m, Range{0.001, 1.0}, "m",
                     "standard deviation across the plane up to which a voxel counts as flat");
         v.parameter("noise_m", noise_m, Range{0.0005, 0.5}, "m", "floor of that deviation");
@@ -45,6 +46,9 @@ struct FixedPoint {
 };
 inline constexpr double kMapUnit_m = 1.0 / 4096.0;
 inline constexpr int kNormalUnits = 1 << 14;
+/// Weight of a point with a normal in its voxel's plane. It is the mean of a flat window; one without a normal may lie
+/// on an edge or on a thing before the surface, and must not tilt the plane.
+inline constexpr int kFlatWeight = 16;
 
 struct VoxelIndex {
     std::int32_t x = 0, y = 0, z = 0;
@@ -85,8 +89,9 @@ class VoxelMap {
 
   private:
     struct Moments {
-        std::int32_t count = 0;
-        std::array<std::int32_t, 3> sum{};     ///< of positions relative to the voxel's centre
+        std::int32_t points = 0;
+        std::int32_t weight = 0;               ///< of all points
+        std::array<std::int64_t, 3> sum{};     ///< of positions relative to the voxel's centre
         std::array<std::int64_t, 6> square{};  ///< xx, xy, xz, yy, yz, zz, with the discs' own
     };
     static constexpr std::uint32_t kNone = ~std::uint32_t{0};

@@ -20,6 +20,7 @@ std::vector<FixedPoint> random_points(std::size_t count, std::uint64_t seed) {
             Eigen::Vector3d(direction(random), direction(random), direction(random)).normalized() * kNormalUnits;
         points.push_back({place(random), place(random), place(random) / 10, static_cast<std::int16_t>(n.x()),
                           static_cast<std::int16_t>(n.y()), static_cast<std::int16_t>(n.z())});
+        if (i % 3 == 0) points.back().nx = points.back().ny = points.back().nz = 0;
     }
     return points;
 }
@@ -43,13 +44,19 @@ TEST(VoxelMap, FitsWhatADirectComputationGives) {
         const Eigen::Vector3d center = (Eigen::Vector3d(x, y, z).array() + 0.5) * 0.5;
         Eigen::Vector3d mean = Eigen::Vector3d::Zero();
         Eigen::Matrix3d square = Eigen::Matrix3d::Zero();
+        const auto weight_of = [](const FixedPoint& p) {
+            return p.nx == 0 && p.ny == 0 && p.nz == 0 ? 1 : kFlatWeight;
+        };
+        double weights = 0.0;
+        for (const FixedPoint& p : inside) weights += weight_of(p);
         for (const FixedPoint& p : inside) {
+            const double share = weight_of(p) / weights;
             const Eigen::Vector3d q = Eigen::Vector3d(p.x, p.y, p.z) * kMapUnit_m - center;
             const Eigen::Vector3d n = Eigen::Vector3d(p.nx, p.ny, p.nz) / kNormalUnits;
-            mean += q / static_cast<double>(inside.size());
+            mean += share * q;
+            square += share * q * q.transpose();
             const double disc = 0.25 * config.surfel_radius_m * config.surfel_radius_m;
-            square += (q * q.transpose() + disc * (Eigen::Matrix3d::Identity() - n * n.transpose())) /
-                      static_cast<double>(inside.size());
+            if (!n.isZero()) square += share * disc * (Eigen::Matrix3d::Identity() - n * n.transpose());
         }
         const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(square - mean * mean.transpose());
         EXPECT_LT((Eigen::Vector3f(plane->mean[0], plane->mean[1], plane->mean[2]).cast<double>() - mean).norm(), 1e-5);
@@ -88,6 +95,22 @@ TEST(VoxelMap, AddingAndRemovingIsExactWhateverTheOrder) {
     busy.remove(b);
     EXPECT_EQ(busy.size(), 0U);
     EXPECT_EQ(busy.find(busy.index_of(b[0])), nullptr);
+}
+
+TEST(VoxelMap, ClutterDoesNotTiltAPlane) {
+    // A floor, and on one side of the voxel a few points of something that stands on it.
+    std::mt19937_64 random(8);
+    std::uniform_int_distribution<std::int32_t> place(100, 1900);
+    std::vector<FixedPoint> points;
+    for (int i = 0; i < 60; ++i) points.push_back({place(random), place(random), 400, 0, 0, kNormalUnits});
+    for (int i = 0; i < 6; ++i) points.push_back({1800, place(random), 400 + 80 * i, 0, 0, 0});
+    VoxelMap map{VoxelMapConfig{}};
+    map.add(points);
+    const VoxelPlane* plane = map.find({0, 0, 0});
+    ASSERT_NE(plane, nullptr);
+    EXPECT_TRUE(plane->flat);
+    EXPECT_GT(std::abs(plane->normal[2]), 0.9999F);
+    EXPECT_NEAR(plane->mean[2], 400 * kMapUnit_m - 0.25, 1e-3);
 }
 
 TEST(VoxelMap, WalksAllOccupiedNeighboursOnce) {
