@@ -63,7 +63,7 @@ bool Detector::State::is_divided(const Segment& segment, const Counts& c) const 
 }
 
 void Detector::State::test(const Frame& frame) {
-    evidence.begin();
+    evidence.begin(frame);
     parts.begin();
     const Preparation& prepared = frame.prepared;
     counts.assign(prepared.segments.size(), {});
@@ -159,7 +159,6 @@ void Detector::process(Frame& frame) {
     if (state.config.use_free_space) state.test(frame);
     state.detect(frame);
     state.complete(frame);
-    if (state.config.use_free_space) state.evidence.remember(frame);
 }
 
 const Image<float>& Detector::residual_image() const {

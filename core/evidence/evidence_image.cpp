@@ -11,10 +11,13 @@ constexpr float kThinStepPerMetre = 0.02F;
 // A requested pixel counts as unknown until run() has tested it.
 constexpr auto kRequested = static_cast<std::uint8_t>(Evidence::kUnknown);
 
-/// Free where some reference is sure of it and not many more object; occupied where they object for long enough.
-Evidence judge(float free, float occupied) {
-    if (free >= 1.0F && occupied <= free + 1.0F) return Evidence::kFree;
-    return occupied >= 1.0F ? Evidence::kOccupied : Evidence::kUnknown;
+/// Free where some reference is sure of it and not many more object, or where what stands there has come from nearer;
+/// occupied where they object for long enough.
+Evidence judge(const CandidatePoints& points, std::size_t i) {
+    if (points.free[i] >= 1.0F && points.occupied[i] <= points.free[i] + 1.0F) return Evidence::kFree;
+    if (points.occupied[i] >= 1.0F) return Evidence::kOccupied;
+    const bool receded = points.gone[i] >= 2.0F && points.slowest[i] <= points.fastest[i];
+    return receded ? Evidence::kFree : Evidence::kUnknown;
 }
 
 /// A return that no neighbour above or below, or none to both sides, is near to: a plate or wire thinner than the beams
@@ -42,11 +45,12 @@ EvidenceImage::EvidenceImage(const SensorModel& sensor, const FreeSpaceConfig& c
     points_.block_end.assign(Reference::kBlocks, 0);
 }
 
-void EvidenceImage::begin() {
+void EvidenceImage::begin(const Frame& frame) {
     image_.fill(0);
     requested_.clear();
     points_.pixel.clear();
     selected_ = references_.select();
+    now_ = &references_.insert(frame);
 }
 
 void EvidenceImage::request(PixelIndex pixel) {
@@ -80,10 +84,10 @@ void EvidenceImage::sort_into_blocks(const OdometryResult& odometry) {
 void EvidenceImage::run(const Frame& frame) {
     sort_into_blocks(frame.odometry);
     requested_.clear();
-    free_space_.test(frame, selected_, points_);
+    free_space_.test(frame, selected_, *now_, points_);
     for (std::size_t i = 0; i < points_.size(); ++i) {
         const PixelIndex pixel = points_.pixel[i];
-        const Evidence evidence = judge(points_.free[i], points_.occupied[i]);
+        const Evidence evidence = judge(points_, i);
         set(pixel, evidence == Evidence::kFree && is_thin(frame.cloud.range_m, pixel) ? Evidence::kUnknown : evidence);
     }
 }

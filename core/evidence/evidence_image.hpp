@@ -16,14 +16,12 @@ class EvidenceImage {
   public:
     EvidenceImage(const SensorModel& sensor, const FreeSpaceConfig& config);
 
-    /// Starts a frame: nothing tested, references chosen.
-    void begin();
+    /// Starts a frame: nothing tested, references chosen; remembers the frame for later ones.
+    void begin(const Frame& frame);
     /// Asks for a test of the pixel, once a frame; it takes place in run().
     void request(PixelIndex pixel);
     /// Tests all requested pixels.
     void run(const Frame& frame);
-    /// Remembers the frame for later ones.
-    void remember(const Frame& frame) { references_.insert(frame); }
     /// Forgets all earlier frames: their poses no longer fit.
     void forget() { references_.clear(); }
 
@@ -39,6 +37,7 @@ class EvidenceImage {
     ReferenceImages references_;
     FreeSpace free_space_;
     std::vector<const Reference*> selected_;
+    const Reference* now_ = nullptr;
     Image<std::uint8_t> image_;
     std::vector<PixelIndex> requested_;
     CandidatePoints points_;

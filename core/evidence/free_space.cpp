@@ -9,6 +9,10 @@
 namespace dlod {
 namespace {
 
+constexpr float kUnknownGap = -1e6F;
+constexpr float kFastest_mps = 30.0F;
+constexpr float kUneven = 0.3F;  // what moves away does so at a speed that is constant to that share
+
 constexpr int kChunk = 256;  // points between the steps of a comparison
 
 struct CompareParameters {
@@ -20,7 +24,7 @@ struct CompareParameters {
 
 DLOD_MULTIVERSION void compare(const CompareParameters& parameters, int n, const std::int32_t* __restrict pixel,
                                const float* __restrict range, const std::uint32_t* __restrict cells,
-                               float* __restrict free_sum, float* __restrict occupied_sum) {
+                               float* __restrict free_sum, float* __restrict occupied_sum, float* __restrict gap) {
     const CompareParameters p = parameters;
     std::int32_t cell[kChunk];
     for (int begin = 0; begin < n; begin += kChunk) {
@@ -43,6 +47,7 @@ DLOD_MULTIVERSION void compare(const CompareParameters& parameters, int n, const
                 known & (nearest <= r + p.tolerance + grown) & (farthest >= r - p.tolerance - grown);
             free_sum[begin + i] += is_free ? 1.0F : 0.0F;
             occupied_sum[begin + i] += is_occupied ? p.occupied_weight : 0.0F;
+            gap[begin + i] = known ? r - nearest : kUnknownGap;
         }
     }
 }
@@ -69,7 +74,9 @@ FreeSpace::FreeSpace(const SensorModel& sensor, const FreeSpaceConfig& config, i
     }
     mean_offset_rad_ = static_cast<float>(columns / std::max(1, sensor.height) * column_rad);
     pixel_.assign(sensor.pixels(), 0);
-    range_.assign(sensor.pixels(), 0.0F);
+    for (auto* v : {&range_, &gap_, &hider_x_, &hider_y_, &hider_z_, &hider_range_}) v->assign(sensor.pixels(), 0.0F);
+    hider_pixel_.assign(sensor.pixels(), 0);
+    hidden_.reserve(sensor.pixels());
 }
 
 /// The block that looks at a point, by its azimuth alone.
@@ -81,8 +88,69 @@ std::size_t FreeSpace::block_of(const Eigen::Vector3f& point) const {
     return std::min<std::size_t>(block, Reference::kBlocks - 1);
 }
 
-void FreeSpace::compare_with(const Reference& reference, float weight, int begin, int n,
-                             CandidatePoints& points) const {
+// What hid a place in a recent frame and is gone now may have moved away to just there: then it hid the place by more
+// the longer ago. An edge behind which the place has come into view is still there, and what passed by hid it by the
+// same all the time.
+void FreeSpace::follow_receding(const Comparison& comparison, const Eigen::Isometry3f& T_column_sensor, int begin,
+                                int n, CandidatePoints& points) {
+    const auto margin_at = [this](float range) {
+        return static_cast<float>(config_.margin_m) + static_cast<float>(config_.margin_per_m) * range;
+    };
+    const auto bound_speed = [&](std::size_t i, float gap, float margin) {
+        const float uneven = kUneven * std::abs(gap);
+        points.slowest[i] = std::max(points.slowest[i], (gap - uneven - margin) / comparison.age_s);
+        points.fastest[i] = std::min(points.fastest[i], (gap + uneven + margin) / comparison.age_s);
+    };
+    hidden_.clear();
+    const Eigen::Vector3f origin = T_column_sensor.inverse().translation();
+    for (int k = 0; k < n; ++k) {
+        const auto scratch = static_cast<std::size_t>(k);
+        const auto i = static_cast<std::size_t>(begin + k);
+        const float range = range_[scratch];
+        const float gap = gap_[scratch];
+        const float margin = margin_at(range);
+        if (gap < -margin) continue;
+        if (gap <= margin) {
+            bound_speed(i, gap, margin);
+            continue;
+        }
+        const float share = 1.0F - gap / range;
+        const std::size_t h = hidden_.size();
+        hider_x_[h] = origin.x() + share * (points.x[i] - origin.x());
+        hider_y_[h] = origin.y() + share * (points.y[i] - origin.y());
+        hider_z_[h] = origin.z() + share * (points.z[i] - origin.z());
+        hidden_.push_back(k);
+    }
+    if (hidden_.empty()) return;
+    const Reference& now = comparison.now;
+    const std::size_t block = block_of({hider_x_[0], hider_y_[0], hider_z_[0]});
+    projection_.project(now.T_block_stamp[block], static_cast<int>(hidden_.size()), hider_x_.data(), hider_y_.data(),
+                        hider_z_.data(), now.column_shift.data(), hider_pixel_.data(), hider_range_.data());
+    for (std::size_t h = 0; h < hidden_.size(); ++h) {
+        const auto scratch = static_cast<std::size_t>(hidden_[h]);
+        const auto i = static_cast<std::size_t>(begin + hidden_[h]);
+        const float range = hider_range_[h];
+        const std::uint32_t seen = hider_pixel_[h] < 0 ? 0U : now.cells[cell_of(hider_pixel_[h], range)];
+        const bool gone = static_cast<float>(seen & 0xFFFFU) * kReferenceUnit_m > range + margin_at(range);
+        if (gone) {
+            points.gone[i] += 1.0F;
+            bound_speed(i, gap_[scratch], margin_at(range_[scratch]));
+        } else {
+            const std::uint32_t hid = comparison.reference.cells[cell_of(pixel_[scratch], range_[scratch])];
+            const float r = range_[scratch];
+            if (static_cast<float>(hid >> 16U) * kReferenceUnit_m < r - margin_at(r)) points.fastest[i] = 0.0F;
+        }
+    }
+}
+
+std::size_t FreeSpace::cell_of(std::int32_t pixel, float range) const {
+    const auto p = static_cast<std::size_t>(pixel);
+    return range < static_cast<float>(config_.near_m) ? (late_.size() >> narrow_bits_) + (p >> wide_bits_)
+                                                      : p >> narrow_bits_;
+}
+
+void FreeSpace::compare_block(const Comparison& comparison, const Eigen::Isometry3f& T_column_sensor, int begin, int n,
+                              CandidatePoints& points) {
     const CompareParameters parameters{static_cast<float>(config_.margin_m),
                                        static_cast<float>(config_.margin_per_m),
                                        static_cast<float>(config_.occupied_tolerance_m),
@@ -90,21 +158,22 @@ void FreeSpace::compare_with(const Reference& reference, float weight, int begin
                                        narrow_bits_,
                                        wide_bits_,
                                        static_cast<std::int32_t>(late_.size() >> narrow_bits_),
-                                       weight};
-    compare(parameters, n, pixel_.data(), range_.data(), reference.cells.data(), points.free.data() + begin,
-            points.occupied.data() + begin);
+                                       comparison.occupied_weight};
+    compare(parameters, n, pixel_.data(), range_.data(), comparison.reference.cells.data(), points.free.data() + begin,
+            points.occupied.data() + begin, gap_.data());
+    if (comparison.recent) follow_receding(comparison, T_column_sensor, begin, n, points);
 }
 
-void FreeSpace::test_block(const Reference& reference, const Eigen::Isometry3f& T_reference_sensor, float weight,
-                           int begin, int n, CandidatePoints& points) {
+void FreeSpace::test_block(const Comparison& comparison, int begin, int n, CandidatePoints& points) {
+    const Reference& reference = comparison.reference;
     // A point in the middle of the block tells when the reference looked there; one step corrects for the motion by
     // then.
     const auto middle = static_cast<std::size_t>(begin + n / 2);
     const Eigen::Vector3f typical =
-        T_reference_sensor * Eigen::Vector3f(points.x[middle], points.y[middle], points.z[middle]);
+        comparison.T_reference_sensor * Eigen::Vector3f(points.x[middle], points.y[middle], points.z[middle]);
     const std::size_t block = block_of(reference.T_block_stamp[block_of(typical)] * typical);
-    const auto project = [&](const Eigen::Isometry3f& T_block_stamp) {
-        projection_.project(T_block_stamp * T_reference_sensor, n, points.x.data() + begin, points.y.data() + begin,
+    const auto project = [&](const Eigen::Isometry3f& T_column_sensor) {
+        projection_.project(T_column_sensor, n, points.x.data() + begin, points.y.data() + begin,
                             points.z.data() + begin, reference.column_shift.data(), pixel_.data(), range_.data());
     };
     const auto keep = [&](bool late) {
@@ -113,31 +182,38 @@ void FreeSpace::test_block(const Reference& reference, const Eigen::Isometry3f& 
             if (pixel >= 0 && (late_[static_cast<std::size_t>(pixel)] != 0) != late) pixel = -1;
         }
     };
-    project(reference.T_block_stamp[block]);
+    const Eigen::Isometry3f T_column_sensor = reference.T_block_stamp[block] * comparison.T_reference_sensor;
+    project(T_column_sensor);
     // At the seam the rows of a block were fired at both ends of the sweep.
     const bool last = block + 1 == Reference::kBlocks;
     const bool seam = last || (static_cast<int>(block) - 1) * projection_.width() / Reference::kBlocks < max_shift_;
     if (seam) keep(last);
-    compare_with(reference, weight, begin, n, points);
+    compare_block(comparison, T_column_sensor, begin, n, points);
     if (!seam || last) return;
-    project(reference.T_block_stamp_late[block]);
+    const Eigen::Isometry3f T_late_sensor = reference.T_block_stamp_late[block] * comparison.T_reference_sensor;
+    project(T_late_sensor);
     keep(true);
-    compare_with(reference, weight, begin, n, points);
+    compare_block(comparison, T_late_sensor, begin, n, points);
 }
 
-void FreeSpace::test(const Frame& frame, std::span<const Reference* const> references, CandidatePoints& points) {
-    points.free.assign(points.size(), 0.0F);
-    points.occupied.assign(points.size(), 0.0F);
+void FreeSpace::test(const Frame& frame, std::span<const Reference* const> references, const Reference& now,
+                     CandidatePoints& points) {
+    for (auto* v : {&points.free, &points.occupied, &points.gone}) v->assign(points.size(), 0.0F);
+    points.slowest.assign(points.size(), static_cast<float>(config_.min_receding_mps));
+    points.fastest.assign(points.size(), kFastest_mps);
     for (const Reference* const reference : references) {
-        const Eigen::Isometry3f T_reference_sensor =
-            (reference->T_world_sensor.inverse() * frame.odometry.T_world_sensor).cast<float>();
         const double age_s = 1e-9 * static_cast<double>(frame.header.stamp_ns - reference->stamp_ns);
         const double weight = config_.settle_s > 0.0 ? std::clamp(age_s / config_.settle_s, 0.0, 1.0) : 1.0;
+        const Comparison comparison{*reference,
+                                    now,
+                                    (reference->T_world_sensor.inverse() * frame.odometry.T_world_sensor).cast<float>(),
+                                    static_cast<float>(age_s),
+                                    static_cast<float>(weight),
+                                    age_s > 0.0 && age_s <= config_.receding_s};
         int begin = 0;
         for (const std::uint32_t block_end : points.block_end) {
             const int end = static_cast<int>(block_end);
-            if (end > begin)
-                test_block(*reference, T_reference_sensor, static_cast<float>(weight), begin, end - begin, points);
+            if (end > begin) test_block(comparison, begin, end - begin, points);
             begin = end;
         }
     }

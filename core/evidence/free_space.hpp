@@ -17,6 +17,8 @@ struct FreeSpaceConfig {
     double near_m = 4.0;
     int octaves = 6;
     double settle_s = 0.8;
+    double receding_s = 1.0;
+    double min_receding_mps = 0.3;
 
     template <class V>
     void visit(V& v) {
@@ -32,16 +34,21 @@ struct FreeSpaceConfig {
                     "earlier frames used: the last and one in each of so many octaves of age");
         v.parameter("settle_s", settle_s, Range{0.0, 10.0}, "s",
                     "a frame so old that saw a place occupied counts fully against motion, younger ones less");
+        v.parameter("receding_s", receding_s, Range{0.0, 10.0}, "s",
+                    "what moves away from the sensor is looked for in so many last seconds; 0: not at all");
+        v.parameter("min_receding_mps", min_receding_mps, Range{0.01, 10.0}, "m/s", "slower is not told from rest");
     }
 };
 
 /// Points to be tested, sorted by block of columns (structure of arrays).
 struct CandidatePoints {
     AlignedVector<PixelIndex> pixel;
-    AlignedVector<float> x, y, z;          ///< sensor frame at the stamp, deskewed
-    AlignedVector<float> free, occupied;   ///< results: for how many references the place was free, and was occupied;
-                                           ///< the latter weighted by age, since what moves slowly was here just before
-    std::vector<std::uint32_t> block_end;  ///< [Reference::kBlocks] end of each block's points
+    AlignedVector<float> x, y, z;         ///< sensor frame at the stamp, deskewed
+    AlignedVector<float> free, occupied;  ///< results: for how many references the place was free, and was occupied;
+                                          ///< the latter weighted by age, since what moves slowly was here just before
+    AlignedVector<float> gone;            ///< results: in how many references something hid the place that is gone now
+    AlignedVector<float> slowest, fastest;  ///< speeds at which that can have moved away to here; none: it did not
+    std::vector<std::uint32_t> block_end;   ///< [Reference::kBlocks] end of each block's points
     std::size_t size() const { return pixel.size(); }
 };
 
@@ -52,13 +59,28 @@ class FreeSpace {
     FreeSpace(const SensorModel& sensor, const FreeSpaceConfig& config, int narrow_bits, int wide_bits);
 
     /// Fills points.free and points.occupied: what the references saw at each point.
-    void test(const Frame& frame, std::span<const Reference* const> references, CandidatePoints& points);
+    /// @param now the frame itself as a reference
+    void test(const Frame& frame, std::span<const Reference* const> references, const Reference& now,
+              CandidatePoints& points);
 
   private:
-    void test_block(const Reference& reference, const Eigen::Isometry3f& T_reference_sensor, float weight, int begin,
-                    int n, CandidatePoints& points);
+    /// A reference in use.
+    struct Comparison {
+        const Reference& reference;
+        const Reference& now;
+        Eigen::Isometry3f T_reference_sensor;
+        float age_s;
+        float occupied_weight;
+        bool recent;  ///< what moves away is looked for
+    };
+
+    void test_block(const Comparison& comparison, int begin, int n, CandidatePoints& points);
+    void compare_block(const Comparison& comparison, const Eigen::Isometry3f& T_column_sensor, int begin, int n,
+                       CandidatePoints& points);
+    void follow_receding(const Comparison& comparison, const Eigen::Isometry3f& T_column_sensor, int begin, int n,
+                         CandidatePoints& points);
+    std::size_t cell_of(std::int32_t pixel, float range) const;
     std::size_t block_of(const Eigen::Vector3f& point) const;
-    void compare_with(const Reference& reference, float weight, int begin, int n, CandidatePoints& points) const;
 
     FreeSpaceConfig config_;
     SensorProjection projection_;
@@ -70,6 +92,10 @@ class FreeSpace {
     int max_shift_ = 0;
     AlignedVector<std::int32_t> pixel_;  ///< scratch of one block
     AlignedVector<float> range_;
+    AlignedVector<float> gap_;          ///< by how much something nearer hid each point
+    std::vector<std::int32_t> hidden_;  ///< points of the block that something hid
+    AlignedVector<float> hider_x_, hider_y_, hider_z_, hider_range_;
+    AlignedVector<std::int32_t> hider_pixel_;
 };
 
 }  // namespace dlod

@@ -101,7 +101,7 @@ void ReferenceImages::clear() {
     inserted_ = 0;
 }
 
-void ReferenceImages::insert(const Frame& frame) {
+const Reference& ReferenceImages::insert(const Frame& frame) {
     std::size_t free = 0;
     while (users_[free] != 0) ++free;
     Reference& reference = pool_[free];
@@ -116,6 +116,7 @@ void ReferenceImages::insert(const Frame& frame) {
         ++users_[free];
     }
     ++inserted_;
+    return reference;
 }
 
 const std::vector<const Reference*>& ReferenceImages::select() {

@@ -36,8 +36,9 @@ class ReferenceImages {
     /// @param levels octaves of age: the oldest reference is about 2^levels frames old
     ReferenceImages(const SensorModel& sensor, int levels);
 
-    /// Remembers a frame whose odometry is valid.
-    void insert(const Frame& frame);
+    /// Remembers a frame whose odometry is valid. What select() gave before stays as it is until the next call.
+    /// @return the frame as a reference
+    const Reference& insert(const Frame& frame);
     void clear();
 
     /// References for the next frame, newest first, none twice.

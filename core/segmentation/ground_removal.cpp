@@ -1,5 +1,6 @@
 #include "core/segmentation/ground_removal.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
@@ -13,8 +14,17 @@ constexpr double kHistogramBin_m = 0.05;
 // does not climb walls.
 constexpr float kHeightMemory_m = 0.1F;
 constexpr float kSlopeGain = 0.2F;
-constexpr float kShortestBase_m = 0.3F;  // returns nearer to each other say nothing about the slope
-constexpr int kRowsAbove = 2;            // slopes are taken over so many rows: between adjacent ones noise prevails
+constexpr float kShortestBase_m = 0.3F;   // returns nearer to each other say nothing about the slope
+constexpr int kRowsAbove = 2;             // slopes are taken over so many rows: between adjacent ones noise prevails
+constexpr double kGravityMemory_s = 3.0;  // braking and steps deceive an accelerometer for shorter times
+constexpr int kRowStep = 2;               // of the pixels that the normal of the ground is taken from
+constexpr int kColumnStep = 8;
+constexpr float kAround = 5.0F;             // how far the ground around reaches, in heights of the sensor
+constexpr float kAroundTolerance_m = 0.1F;  // of its points from a plane
+constexpr float kAroundSlope = 0.1F;        // growth of that in the first round, with distance
+constexpr int kFewestAround = 100;
+constexpr float kMostFromGravity = 0.9F;  // cosine
+constexpr float kUpGain = 0.5F;
 // Range noise allowed in a slope, as a share of what a wall would rise over those rows.
 constexpr float kNoiseShare = 0.3F;
 
@@ -93,13 +103,52 @@ GroundRemoval::GroundRemoval(const SensorModel& sensor, const GroundRemovalConfi
     histogram_.assign(static_cast<std::size_t>(span / kHistogramBin_m) + 2, 0);
 }
 
-void GroundRemoval::update_up(const Frame& frame) {
+void GroundRemoval::update_gravity(const Frame& frame) {
     Eigen::Vector3f sum = Eigen::Vector3f::Zero();
     for (const ImuSample& sample : frame.imu) sum += sample.acceleration_mps2;
     const Eigen::Vector3f mean = sensor_.T_sensor_imu.linear().cast<float>() *
                                  (frame.imu.empty() ? sum : sum / static_cast<float>(frame.imu.size()));
-    // A reading far from 1 g is a shock or a faulty IMU: the vertical of the frame before stays.
-    if (std::abs(mean.norm() - 9.81F) < 2.0F) up_ = mean.normalized();
+    // A reading far from 1 g is a shock or a faulty IMU.
+    if (std::abs(mean.norm() - 9.81F) > 2.0F) return;
+    const float gain = started_ ? static_cast<float>(sensor_.frame_period_s / kGravityMemory_s) : 1.0F;
+    gravity_up_ = (gravity_up_ + gain * (mean.normalized() - gravity_up_)).normalized();
+    if (!started_) up_ = gravity_up_;
+    started_ = true;
+}
+
+void GroundRemoval::update_up(const Frame& frame) {
+    const Eigen::Vector3f side = up_.unitOrthogonal();
+    const Eigen::Vector3f front = up_.cross(side);
+    const auto farthest = kAround * static_cast<float>(sensor_height_m_);
+    const StructuredCloud& cloud = frame.cloud;
+    // Twice: the second time without what does not lie in the first plane, kerbs and feet.
+    Eigen::Vector3f plane(0.0F, 0.0F, static_cast<float>(-sensor_height_m_));
+    int used = 0;
+    for (const float slope : {kAroundSlope, 0.0F}) {
+        Eigen::Matrix3f A = Eigen::Matrix3f::Zero();
+        Eigen::Vector3f b = Eigen::Vector3f::Zero();
+        used = 0;
+        for (int r = sensor_.height - 1; r >= 0; r -= kRowStep) {
+            for (int c = 0; c < sensor_.width; c += kColumnStep) {
+                if (frame.prepared.ground(r, c) == 0 || cloud.range_m(r, c) > 2.0F * farthest) continue;
+                const Eigen::Vector3f p(cloud.x(r, c), cloud.y(r, c), cloud.z(r, c));
+                const Eigen::Vector3f row(side.dot(p), front.dot(p), 1.0F);
+                const float height = up_.dot(p);
+                if (row.head<2>().squaredNorm() > farthest * farthest ||
+                    std::abs(height - plane.dot(row)) > kAroundTolerance_m + slope * row.head<2>().norm())
+                    continue;
+                A += row * row.transpose();
+                b += row * height;
+                ++used;
+            }
+        }
+        if (used < kFewestAround) break;
+        plane = (A + 1e-3F * Eigen::Matrix3f::Identity()).ldlt().solve(b);
+    }
+    Eigen::Vector3f normal = gravity_up_;
+    if (used >= kFewestAround) normal = (up_ - plane.x() * side - plane.y() * front).normalized();
+    if (normal.dot(gravity_up_) < kMostFromGravity) normal = gravity_up_;
+    up_ = (up_ + kUpGain * (normal - up_)).normalized();
 }
 
 int GroundRemoval::top_row() const {
@@ -118,7 +167,6 @@ void GroundRemoval::update_sensor_height(const StructuredCloud& cloud) {
     const auto max_slope = static_cast<float>(std::tan(config_.max_slope_rad));
     const auto min_range = static_cast<float>(config_.min_range_m);
     const auto highest = static_cast<float>(-config_.min_sensor_height_m);
-    constexpr int kColumnStep = 8;
     constexpr float kFarthest_m = 15.0F;
     const int top = std::max(kRowsAbove, top_row());
     for (int r = sensor_.height - 1; r >= top; --r) {
@@ -159,12 +207,20 @@ void GroundRemoval::update_sensor_height(const StructuredCloud& cloud) {
 }
 
 void GroundRemoval::process(Frame& frame) {
-    update_up(frame);
+    update_gravity(frame);
     update_sensor_height(frame.cloud);
     if (sensor_height_m_ == 0.0) {
         frame.prepared.ground.fill(0);
         return;
     }
+    follow_ground(frame);
+    update_up(frame);
+    if (settled_) return;
+    follow_ground(frame);
+    settled_ = true;
+}
+
+void GroundRemoval::follow_ground(Frame& frame) {
     std::fill(line_distance_.begin(), line_distance_.end(), 0.0F);
     std::fill(line_height_.begin(), line_height_.end(), static_cast<float>(-sensor_height_m_));
     std::fill(line_slope_.begin(), line_slope_.end(), 0.0F);

@@ -40,8 +40,9 @@ struct GroundRemovalConfig {
     }
 };
 
-/// Fills frame.prepared.ground from frame.cloud; the vertical comes from the frame's IMU samples, without any from the
-/// sensor's z axis. Needs no pose.
+/// Fills frame.prepared.ground from frame.cloud. The vertical is the normal of the ground around the robot, which
+/// hardly turns with respect to the sensor and is not deceived by braking; at the start, and where too little ground is
+/// seen, it is that of the accelerometer over some seconds, without IMU the sensor's z axis. Needs no pose.
 class GroundRemoval {
   public:
     GroundRemoval(const SensorModel& sensor, const GroundRemovalConfig& config);
@@ -53,13 +54,19 @@ class GroundRemoval {
     const Eigen::Vector3f& up() const { return up_; }
 
   private:
+    void update_gravity(const Frame& frame);
+    /// Turns the vertical to the normal of the ground around; to gravity where there is too little ground.
     void update_up(const Frame& frame);
+    void follow_ground(Frame& frame);
     void update_sensor_height(const StructuredCloud& cloud);
     /// Rows above this one look too far up to see ground.
     int top_row() const;
 
     SensorModel sensor_;
     GroundRemovalConfig config_;
+    Eigen::Vector3f gravity_up_ = Eigen::Vector3f::UnitZ();  ///< from the accelerometer, over seconds
+    bool started_ = false;  ///< gravity_up_ is known
+    bool settled_ = false;  ///< up_ is that of ground
     Eigen::Vector3f up_ = Eigen::Vector3f::UnitZ();
     double sensor_height_m_ = 0.0;
     /// Of the row at hand and those that its slopes are taken to, [kRows][W]: horizontal distance from the sensor (0:

@@ -85,6 +85,19 @@ TEST(GroundRemoval, TiltedSensorFollowsTheImu) {
     EXPECT_LE(counts.other_taken, 0.03 * counts.other);
 }
 
+TEST(GroundRemoval, BrakingDoesNotTiltTheGround) {
+    Frame frame(kSensor);
+    test::render(kSensor, kFlat, at_height(1.2), frame);
+    GroundRemoval removal(kSensor, {});
+    for (int k = 0; k < 20; ++k) {
+        ImuSample sample;
+        sample.acceleration_mps2 = Eigen::Vector3f(k < 5 ? 0.0F : -3.0F, 0.0F, 9.81F);
+        frame.imu.assign(1, sample);
+        removal.process(frame);
+        EXPECT_GT(removal.up().z(), std::cos(0.02F)) << k;
+    }
+}
+
 TEST(GroundRemoval, RampAndKerbAreGround) {
     const double slope = std::tan(0.12);
     const Scene ramp = [slope](const Eigen::Vector3d& o, const Eigen::Vector3d& d) {
