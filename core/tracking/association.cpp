@@ -14,7 +14,6 @@ constexpr double kBeyond = 2.0;      // any gated distance above 1
 constexpr double kMaxSlack_m = 6.0;  // of the boxes of the largest vehicles
 constexpr double kSlack_m = 0.1;
 constexpr double kSlackOfSize = 0.15;
-constexpr double kSlackOfMissing = 0.25;
 // Where two tracks compete for one detection, the other part of the object was hidden, or two parts are seen as one
 // again: the established track is the object.
 constexpr double kYouth = 0.3;
@@ -28,24 +27,38 @@ struct Comparison {
     double iou = 0.0;
 };
 
-/// @param slack_m the detection's middle may be off by that much from the box's, apart from motion
+/// @param offset_m of the detection's middle in the ground plane from where the box has it
+/// @param slack_m it may be off by that much, apart from motion
 Comparison compare_box(const ExpectedTrack& track, const OrientedBox& box, const CandidateDetection& detection,
-                       double slack_m, const AssociationConfig& config) {
+                       const Eigen::Vector2d& offset_m, double slack_m, const AssociationConfig& config) {
     Comparison c;
-    const Eigen::Vector2d offset = (detection.visible.center_m - box.center_m).head<2>();
-    const double distance = offset.norm();
+    const double distance = offset_m.norm();
     const double reach = config.max_speed_mps * track.dt_s + slack_m;
     if (distance > reach) return c;
     if (track.young) {
         c.distance = distance / reach;
     } else {
-        const Eigen::Vector2d expected = track.whole.center_m.head<2>() + offset;
+        const Eigen::Vector2d expected = track.whole.center_m.head<2>() + offset_m;
         const double d2 =
             track.filter->plane_distance2(expected, detection.age_s, slack_m * slack_m * Eigen::Matrix2d::Identity());
         c.distance = std::sqrt(d2) / config.gate_sigma;
     }
     if (c.distance <= 1.0) c.iou = box_iou(box, detection.visible);
     return c;
+}
+
+/// What is smaller than the whole may be anywhere inside of it: how far its middle is from the nearest such place.
+Eigen::Vector2d offset_from_inside(const OrientedBox& whole, const OrientedBox& part) {
+    const Eigen::Vector2d along(std::cos(whole.yaw_rad), std::sin(whole.yaw_rad));
+    const Eigen::Vector2d across(-along.y(), along.x());
+    const Eigen::Vector2d offset = (part.center_m - whole.center_m).head<2>();
+    const double c = std::abs(std::cos(part.yaw_rad - whole.yaw_rad)),
+                 s = std::abs(std::sin(part.yaw_rad - whole.yaw_rad));
+    const auto beyond = [](double off, double room) {
+        return std::copysign(std::max(0.0, std::abs(off) - 0.5 * std::abs(room)), off);
+    };
+    return beyond(along.dot(offset), whole.size_m.x() - c * part.size_m.x() - s * part.size_m.y()) * along +
+           beyond(across.dot(offset), whole.size_m.y() - s * part.size_m.x() - c * part.size_m.y()) * across;
 }
 
 /// Against the visible box of the last sighting or, where the object is seen better or worse than then, its whole box.
@@ -56,12 +69,10 @@ Comparison compare(const ExpectedTrack& track, const CandidateDetection& detecti
     // Visible boxes shift by a part of their size when limbs and sides come and go.
     const double size = detection.visible.size_m.head<2>().norm();
     const double slack = kSlack_m + kSlackOfSize * std::min(track.visible.size_m.head<2>().norm(), size);
-    const Comparison visible = compare_box(track, track.visible, detection, slack, config);
+    const Comparison visible = compare_box(track, track.visible, detection, offset, slack, config);
     if (!track.established) return visible;
-    const double whole_size = track.whole.size_m.head<2>().norm();
-    const double whole_slack =
-        kSlack_m + kSlackOfSize * std::min(whole_size, size) + kSlackOfMissing * std::abs(whole_size - size);
-    const Comparison whole = compare_box(track, track.whole, detection, whole_slack, config);
+    const Comparison whole =
+        compare_box(track, track.whole, detection, offset_from_inside(track.whole, detection.visible), slack, config);
     return {std::min(visible.distance, whole.distance), std::max(visible.iou, whole.iou)};
 }
 

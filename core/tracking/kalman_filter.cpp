@@ -107,7 +107,7 @@ void KalmanFilter::align_axes(double reference_yaw_rad) {
 void KalmanFilter::grow(double front_m, double back_m, double left_m, double right_m) {
     const Eigen::Vector2d along(std::cos(state_(kYaw)), std::sin(state_(kYaw)));
     const auto move_end = [&](double by_m, const Eigen::Vector2d& outwards, Index size) {
-        if (by_m <= 0.0) return;
+        if (by_m == 0.0) return;
         // The other end stays: whatever size is measured later, the middle follows without any motion.
         State change = State::Zero();
         change.head<2>() = 0.5 * by_m * outwards;

@@ -43,7 +43,8 @@ class KalmanFilter {
     /// swaps length and width. The footprint stays what it was.
     void align_axes(double reference_yaw_rad);
 
-    /// The object is longer or wider than was known: moves the ends of the box outwards, without any motion.
+    /// The object is longer or wider than was known: moves the ends of the box outwards (negative: inwards), without
+    /// any motion.
     void grow(double front_m, double back_m, double left_m, double right_m);
 
     /// Squared Mahalanobis distance in the ground plane of a position measured with the given covariance.

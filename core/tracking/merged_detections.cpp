@@ -88,7 +88,7 @@ bool MergedDetections::share_out(const Detection& whole, const DetectionShapes& 
 }
 
 bool MergedDetections::cut_out(const Detection& whole, const DetectionShapes& shapes, const ExpectedTrack& track) {
-    if (!track.established || track.motion < kMoving) return false;
+    if (track.motion < kMoving) return false;
     OrientedBox box = track.whole;
     if (whole.box.size_m.head<2>().norm() < kSameSize * box.size_m.head<2>().norm() + kSameSize_m) return false;
     // More of a long object may come into view at its ends.

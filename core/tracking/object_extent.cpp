@@ -43,13 +43,13 @@ struct CompletedSide {
     double growth_low_m = 0.0, growth_high_m = 0.0;
 };
 
-/// What is wide both ways is not one thing that can move: it has merged with another.
-double longest_beside(double other_side_m) {
-    return other_side_m > kWidest_m ? kWidest_m : kLongest_m;
+/// What is wide both ways is not one thing that can move: its shorter side is taken back.
+double longest_side(double side_m, double other_side_m) {
+    return other_side_m > kWidest_m && side_m <= other_side_m ? kWidest_m : kLongest_m;
 }
 
 /// @param center_m of the visible side, from the remembered centre
-/// @param most_m it grows no longer than that
+/// @param most_m it is no longer than that
 CompletedSide complete_side(double center_m, double visible_m, double before_m, double remembered_m, double most_m,
                             HiddenEnds hidden, const KalmanConfig& config) {
     CompletedSide side{center_m, visible_m, config.position_sd_m, config.size_sd_m, 0.0, 0.0};
@@ -58,7 +58,7 @@ CompletedSide complete_side(double center_m, double visible_m, double before_m, 
         side.position_sd_m += kLimb * std::abs(remembered_m - visible_m);
         return side;
     }
-    const double growth = std::max(0.0, std::min({visible_m, before_m, most_m}) - remembered_m);
+    const double growth = std::min(std::max(remembered_m, std::min(visible_m, before_m)), most_m) - remembered_m;
     side.size_m = remembered_m + growth;
     side.size_sd_m = kNotSeen;
     const double missing = side.size_m - visible_m;
@@ -67,7 +67,7 @@ CompletedSide complete_side(double center_m, double visible_m, double before_m, 
         const double slack = 0.5 * std::max(0.0, missing);
         const double toward = growth > 0.0 ? 0.0 : std::clamp(-center_m, -slack, slack);
         side.center_m = center_m + toward;
-        const double beyond = std::clamp(center_m / std::max(1e-6, 0.5 * growth), -1.0, 1.0);
+        const double beyond = std::clamp(center_m / std::max(1e-6, 0.5 * std::abs(growth)), -1.0, 1.0);
         side.growth_high_m = 0.5 * (1.0 + beyond) * growth;
         side.growth_low_m = growth - side.growth_high_m;
         side.position_sd_m += 0.5 * std::abs(missing);
@@ -87,12 +87,12 @@ ExtentMeasurement complete_extent(const OrientedBox& visible, const Eigen::Vecto
     const Eigen::Vector2d along(std::cos(visible.yaw_rad), std::sin(visible.yaw_rad));
     const Eigen::Vector2d across(-along.y(), along.x());
     const Eigen::Vector2d offset = (visible.center_m - remembered.center_m).head<2>();
-    const CompletedSide length =
-        complete_side(along.dot(offset), visible.size_m.x(), before_m.x(), remembered.size_m.x(),
-                      longest_beside(remembered.size_m.y()), hidden_ends(along, visible, visibility), config);
-    const CompletedSide width =
-        complete_side(across.dot(offset), visible.size_m.y(), before_m.y(), remembered.size_m.y(),
-                      longest_beside(remembered.size_m.x()), hidden_ends(across, visible, visibility), config);
+    const CompletedSide length = complete_side(
+        along.dot(offset), visible.size_m.x(), before_m.x(), remembered.size_m.x(),
+        longest_side(remembered.size_m.x(), remembered.size_m.y()), hidden_ends(along, visible, visibility), config);
+    const CompletedSide width = complete_side(
+        across.dot(offset), visible.size_m.y(), before_m.y(), remembered.size_m.y(),
+        longest_side(remembered.size_m.y(), remembered.size_m.x()), hidden_ends(across, visible, visibility), config);
     ExtentMeasurement out;
     out.growth = {length.growth_high_m, length.growth_low_m, width.growth_high_m, width.growth_low_m};
     BoxMeasurement& m = out.box;
@@ -105,6 +105,12 @@ ExtentMeasurement complete_extent(const OrientedBox& visible, const Eigen::Vecto
     m.z_sd_m = config.position_sd_m + 0.25 * std::abs(remembered.size_m.z() - visible.size_m.z());
     m.yaw_sd_rad = kNotSeen;
     m.size_sd_m = Eigen::Vector3d(length.size_sd_m, width.size_sd_m, config.size_sd_m);
+    // So is what is seen: merged with something else, it says little of the object.
+    const double excess = visible.size_m.head<2>().minCoeff() - kWidest_m;
+    if (excess > 0.0) {
+        m.plane_covariance += (1.0 + excess * excess) * Eigen::Matrix2d::Identity();
+        m.size_sd_m.head<2>().setConstant(kNotSeen);
+    }
     return out;
 }
 
