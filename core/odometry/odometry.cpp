@@ -86,10 +86,11 @@ struct Odometry::State {
     MovingPoints moving;
 
     bool started = false;
-    bool bootstrapping = false;     ///< the map is one scan that has not been deskewed for its velocity
-    MotionFilter first_filter;      ///< while bootstrapping: at the stamp of that scan
-    PointSelection first_points;    ///< while bootstrapping: of that scan
-    double first_duration_s = 0.0;  ///< while bootstrapping: of that scan
+    std::uint64_t map_sequence = 0;  ///< of the frame that the map began with
+    bool bootstrapping = false;      ///< the map is one scan that has not been deskewed for its velocity
+    MotionFilter first_filter;       ///< while bootstrapping: at the stamp of that scan
+    PointSelection first_points;     ///< while bootstrapping: of that scan
+    double first_duration_s = 0.0;   ///< while bootstrapping: of that scan
     std::int64_t last_registered_ns = 0;
     Eigen::Isometry3d T_world_target = Eigen::Isometry3d::Identity();     ///< pose of the first stage's target scan
     std::int64_t target_ns = 0;                                           ///< its stamp
@@ -206,7 +207,8 @@ void Odometry::State::use_constant_velocity() {
 
 void Odometry::State::apply(const OdometryFeedback& feedback) {
     for (const OrientedBox& box : feedback.cleared) keyframes.remove_points(box);
-    if (feedback.has_keyframe) keyframes.add(feedback.keyframe);
+    // One of before a restart is of another map.
+    if (feedback.has_keyframe && feedback.sequence >= map_sequence) keyframes.add(feedback.keyframe);
     moving.set(feedback.moving, feedback.stamp_ns);
 }
 
@@ -291,6 +293,7 @@ void Odometry::State::start(const Frame& frame, const Eigen::Isometry3d& T_world
     filter.initialize(T, gravity, frame.header.stamp_ns, with_imu ? &imu : nullptr);
     if (monitor.faulty()) flags |= OdometryResult::kImuFaulty;
     started = true;
+    map_sequence = frame.header.sequence;
     bootstrapping = true;
     registered = true;
     choose_origin();
