@@ -4,6 +4,8 @@
 #include <bit>
 #include <cstring>
 
+#include "core/types/multiversion.hpp"
+
 namespace dlod::driver {
 namespace {
 
@@ -130,6 +132,17 @@ IpPacket parse_ipv6(Bytes b) {
     return p;
 }
 
+DLOD_MULTIVERSION
+std::uint64_t sum_of_words(std::size_t count, const std::byte* __restrict bytes) {
+    std::uint64_t sum = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        std::uint32_t word;
+        std::memcpy(&word, bytes + 4 * i, 4);
+        sum += word;
+    }
+    return sum;
+}
+
 }  // namespace
 
 bool link_type_supported(int link_type) {
@@ -222,16 +235,11 @@ std::optional<UdpDatagram> parse_udp(const IpAddress& source, const IpAddress& d
 
 std::uint16_t internet_checksum(Bytes bytes, std::uint32_t initial) {
     // Summed in host order, 32 bits at a time, and swapped once at the end: the sum does not depend on byte order.
-    std::uint64_t sum = 0;
-    std::size_t at = 0;
-    for (; at + 4 <= bytes.size(); at += 4) {
-        std::uint32_t word;
-        std::memcpy(&word, bytes.data() + at, 4);
-        sum += word;
-    }
-    if (at < bytes.size()) {
+    const std::size_t words = bytes.size() / 4;
+    std::uint64_t sum = sum_of_words(words, bytes.data());
+    if (const std::size_t rest = bytes.size() % 4; rest != 0) {
         std::uint32_t word = 0;
-        std::memcpy(&word, bytes.data() + at, bytes.size() - at);
+        std::memcpy(&word, bytes.data() + 4 * words, rest);
         sum += word;
     }
     while (sum >> 16 != 0) sum = (sum & 0xFFFF) + (sum >> 16);

@@ -63,6 +63,7 @@ class PcapSource final : public PacketSource {
 
     std::filesystem::path path_;
     PcapOptions options_;
+    std::unique_ptr<char[]> file_buffer_;  ///< of the file that pcap_ owns
     std::unique_ptr<pcap, void (*)(pcap*)> pcap_;
     int link_type_ = 0;
     std::uint64_t file_size_ = 0;
