@@ -8,12 +8,22 @@
 #include <vector>
 
 #include "core/map/persistence.hpp"
+#include "core/types/image.hpp"
 
 namespace dlod {
 
 /// A point of a map, world frame, metres.
 struct MapPoint {
     float x = 0.0F, y = 0.0F, z = 0.0F;
+};
+
+/// Points of a map (structure of arrays).
+struct MapPoints {
+    AlignedVector<float> x, y, z;
+    std::size_t size() const { return x.size(); }
+    void resize(std::size_t n) {
+        for (auto* v : {&x, &y, &z}) v->resize(n);
+    }
 };
 
 /// Open addressing with linear probing; erasing leaves no tombstones. Grows by doubling, never shrinks by itself.
@@ -35,13 +45,13 @@ class CellTable {
     }
 
     /// Keeps the point unless its cell holds one already, which has then been seen again.
-    void insert(const MapPoint& point, std::uint16_t now_ds = 0);
+    void insert(const MapPoint& point, std::uint16_t now_ds = 0) { insert(key_of(point), point, now_ds); }
+    /// The same for many, in their order.
+    void insert(const MapPoints& points, std::uint16_t now_ds);
     /// The point of a cell, or nullptr. Valid until the next change.
     const MapPoint* find(const Index& index) const;
     /// Forgets a cell; false where it was empty.
     bool erase(const Index& index);
-    /// Loads the memory of a cell ahead of its use.
-    void prefetch(const MapPoint& point) const { __builtin_prefetch(&slots_[home(key_of(point))], 1); }
 
     /// Number of slots, for walking over the table piece by piece.
     std::size_t slots() const { return slots_.size(); }
@@ -87,17 +97,13 @@ class CellTable {
     };
     static constexpr std::uint64_t kEmpty = ~std::uint64_t{0};
 
-    static std::uint64_t key_of(const Index& i) {
-        constexpr std::uint64_t kMask = (std::uint64_t{1} << 21U) - 1;
-        constexpr std::int64_t kOffset = std::int64_t{1} << 20U;
-        const auto part = [](std::int32_t v) { return static_cast<std::uint64_t>(v + kOffset) & kMask; };
-        return part(i.x) << 42U | part(i.y) << 21U | part(i.z);
-    }
+    static std::uint64_t key_of(const Index& i);
     std::uint64_t key_of(const MapPoint& p) const { return key_of(index_of(p.x, p.y, p.z)); }
     std::size_t home(std::uint64_t key) const {
         return static_cast<std::size_t>((key * 0x9E3779B97F4A7C15ULL) >> shift_);
     }
     std::size_t slot_of(std::uint64_t key) const;
+    void insert(std::uint64_t key, const MapPoint& point, std::uint16_t now_ds);
     void insert_new(const Slot& slot);
     void grow();
 
@@ -107,6 +113,7 @@ class CellTable {
     std::vector<Slot> slots_;
     unsigned shift_;
     std::size_t size_ = 0;
+    AlignedVector<std::uint64_t> keys_;  ///< of the points at hand
 };
 
 }  // namespace dlod

@@ -4,11 +4,12 @@
 #include <cmath>
 #include <cstdint>
 
+#include "core/types/multiversion.hpp"
+
 namespace dlod {
 
 namespace {
 
-constexpr std::size_t kPrefetch = 12;  // points: about the latency of main memory
 constexpr std::size_t kClearedCellsAFrame = 4000;
 constexpr std::size_t kSweptSlotsAFrame = 4000;
 constexpr double kForgottenShare = 0.1;  // of a full map, at a time
@@ -18,13 +19,14 @@ constexpr std::int64_t kDecisecond_ns = 100'000'000;
 constexpr std::int64_t kLongestTurn_ns =
     1'000'000'000;  // a longer step is the clock's, or a gap in which nothing was seen
 
-/// Near pixels lie many to a cell: of each four that are looked at, so many are skipped.
+constexpr std::size_t kRowStep = 4;
+/// Near pixels lie many to a cell: of the pixels of a row every fourth, every second, every one enters.
 constexpr float kNear_m = 8.0F, kMiddle_m = 16.0F;
 
 /// What one frame adds and clears, kept until it is its turn.
 struct Postponed {
     std::int64_t time_ns = 0;
-    std::vector<MapPoint> points;
+    MapPoints points;
     std::vector<OrientedBox> cleared;
 };
 
@@ -37,6 +39,21 @@ std::uint16_t deciseconds(std::int64_t time_ns) {
     return static_cast<std::uint16_t>(time_ns / kDecisecond_ns);
 }
 
+/// out = T p for the points of `pixel`. @param T row-major 3 x 4
+DLOD_MULTIVERSION
+void place_points(std::size_t count, const PixelIndex* __restrict pixel, const float* __restrict x,
+                  const float* __restrict y, const float* __restrict z, const float* __restrict T,
+                  float* __restrict out_x, float* __restrict out_y, float* __restrict out_z) {
+    for (std::size_t i = 0; i < count; ++i) {
+        const float px = x[pixel[i]];
+        const float py = y[pixel[i]];
+        const float pz = z[pixel[i]];
+        out_x[i] = T[0] * px + T[1] * py + T[2] * pz + T[3];
+        out_y[i] = T[4] * px + T[5] * py + T[6] * pz + T[7];
+        out_z[i] = T[8] * px + T[9] * py + T[10] * pz + T[11];
+    }
+}
+
 }  // namespace
 
 struct GlobalMap::State {
@@ -46,10 +63,19 @@ struct GlobalMap::State {
           rule(rule_of(map)),
           cells(map.cell_m, rule),
           waiting(static_cast<std::size_t>(map.delay_frames) + 1) {
-        for (Postponed& p : waiting) p.points.reserve(sensor.pixels() / 4 + static_cast<std::size_t>(sensor.height));
+        // As large as it may become, once and for all.
+        for (Postponed& p : waiting) p.points.resize(selected_capacity());
+        selected.resize(selected_capacity());
     }
 
+    /// Pixels of a frame that are looked at, and one beyond them.
+    std::size_t selected_capacity() const {
+        return (static_cast<std::size_t>(sensor.height) + kRowStep - 1) / kRowStep *
+                   static_cast<std::size_t>(sensor.width) +
+               1;
+    }
     void postpone(const Frame& frame, Postponed& out);
+    std::size_t select(const Frame& frame);
     void enter(Postponed& postponed);
     void clear_some(std::size_t budget);
     void sweep_unconfirmed();
@@ -59,7 +85,8 @@ struct GlobalMap::State {
     GlobalMapConfig config;
     Persistence::Rule rule;
     CellTable cells;
-    std::vector<Postponed> waiting;  ///< ring over the frames
+    std::vector<Postponed> waiting;      ///< ring over the frames
+    AlignedVector<PixelIndex> selected;  ///< pixels of the frame at hand that enter
     std::uint64_t frames = 0;
     std::int64_t last_stamp_ns = 0;
     std::int64_t time_ns = 0;          ///< time that has passed, whatever the sensor's clock did
@@ -97,9 +124,10 @@ std::vector<MapPoint> GlobalMap::points() const {
     return s.cells.sorted([&](const Persistence& seen) { return seen.confirmed() || seen.span_ds() >= enough_ds; });
 }
 
-// Every fourth pixel of each row, shifted from row to row and from frame to frame, so that four frames see all.
+// Every fourth row, another one each time, so that four frames see all; of near surfaces, which fill many pixels of a
+// row, fewer.
 void GlobalMap::State::postpone(const Frame& frame, Postponed& out) {
-    out.points.clear();
+    out.points.resize(0);
     out.cleared.clear();
     if (last_stamp_ns != 0)
         time_ns += std::clamp<std::int64_t>(frame.header.stamp_ns - last_stamp_ns, 0, kLongestTurn_ns);
@@ -108,38 +136,49 @@ void GlobalMap::State::postpone(const Frame& frame, Postponed& out) {
     if (!frame.odometry.valid) return;
     position_m = frame.odometry.T_world_sensor.translation();
     out.cleared.assign(frame.detection.cleared.begin(), frame.detection.cleared.end());
-    const Eigen::Isometry3f T = frame.odometry.T_world_sensor.cast<float>();
+    const std::size_t count = select(frame);
+    out.points.resize(count);
+    float T_world_sensor[12];
+    for (int i = 0; i < 12; ++i) {
+        T_world_sensor[i] = static_cast<float>(frame.odometry.T_world_sensor.matrix()(i / 4, i % 4));
+    }
+    place_points(count, selected.data(), frame.odometry.x.data(), frame.odometry.y.data(), frame.odometry.z.data(),
+                 T_world_sensor, out.points.x.data(), out.points.y.data(), out.points.z.data());
+}
+
+// Every fourth row, another one each time, so that four frames see all; of near surfaces, which fill many pixels of a
+// row, fewer. Fills `selected` and returns how many they are.
+std::size_t GlobalMap::State::select(const Frame& frame) {
     const auto min_range = static_cast<float>(config.min_range_m);
     const auto max_range = static_cast<float>(config.max_range_m);
     const auto width = static_cast<std::size_t>(sensor.width);
-    for (std::size_t r = 0; r < static_cast<std::size_t>(sensor.height); ++r) {
+    // Of each four rows the first, third, second, fourth: not next to the one just seen.
+    const std::size_t first_row = (frames & 1U) * 2 + (frames >> 1U & 1U);
+    PixelIndex* const out = selected.data();
+    std::size_t count = 0;
+    for (std::size_t r = first_row; r < static_cast<std::size_t>(sensor.height); r += kRowStep) {
         const std::uint8_t* label = frame.detection.label.row(static_cast<int>(r));
         const float* range = frame.cloud.range_m.row(static_cast<int>(r));
-        for (std::size_t c = (frames + 2 * r) % 4; c < width; c += 4) {
-            const bool enters = label[c] == static_cast<std::uint8_t>(PixelLabel::kStatic) ||
-                                label[c] == static_cast<std::uint8_t>(PixelLabel::kGround);
-            if (!enters || range[c] < min_range || range[c] > max_range) continue;
-            const unsigned skipped = range[c] < kNear_m ? 3U : range[c] < kMiddle_m ? 1U : 0U;
-            if (((c / 4 + frames / 4 + r / 2) & skipped) != 0) continue;
-            const std::size_t i = r * width + c;
-            const Eigen::Vector3f p =
-                T * Eigen::Vector3f(frame.odometry.x[i], frame.odometry.y[i], frame.odometry.z[i]);
-            out.points.push_back({p.x(), p.y(), p.z()});
+        const std::size_t phase = frames / kRowStep + r / kRowStep;
+        for (std::size_t c = 0; c < width; ++c) {
+            const bool is_static = label[c] == static_cast<std::uint8_t>(PixelLabel::kStatic) ||
+                                   label[c] == static_cast<std::uint8_t>(PixelLabel::kGround);
+            const bool in_range = range[c] >= min_range && range[c] <= max_range;
+            const std::size_t skipped = range[c] < kNear_m ? 3 : range[c] < kMiddle_m ? 1 : 0;
+            const bool enters = is_static && in_range && ((c + phase) & skipped) == 0;
+            out[count] = static_cast<PixelIndex>(r * width + c);
+            count += enters ? 1 : 0;
         }
     }
+    return count;
 }
 
 void GlobalMap::State::enter(Postponed& postponed) {
-    const auto& points = postponed.points;
     entered_time_ns = postponed.time_ns;
-    const std::uint16_t now_ds = deciseconds(postponed.time_ns);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-        if (i + kPrefetch < points.size()) cells.prefetch(points[i + kPrefetch]);
-        cells.insert(points[i], now_ds);
-    }
+    cells.insert(postponed.points, deciseconds(postponed.time_ns));
     // Everything that was seen before the object turned dynamic has entered by now.
     to_clear.insert(to_clear.end(), postponed.cleared.begin(), postponed.cleared.end());
-    postponed.points.clear();
+    postponed.points.resize(0);
     postponed.cleared.clear();
 }
 

@@ -12,10 +12,17 @@ namespace {
 
 /// Two under construction, and one at work and one waiting at each of the heavier stages.
 constexpr std::size_t kReplayFrames = 9;
+/// One thread finishes a frame before it begins the next: two under construction, two free as the ingest wants them.
+constexpr std::size_t kSingleThreadFrames = 4;
 /// Live, none may be missing although every stage has one at work and one waiting.
 constexpr std::size_t kLiveFrames = 13;
 /// Between stages: what is further ahead is only older when its turn comes.
 constexpr std::size_t kQueueLength = 1;
+
+std::size_t pool_size(const PipelineOptions& options) {
+    if (options.live) return kLiveFrames + static_cast<std::size_t>(options.waiting_frames);
+    return options.threads == 1 && !options.paced ? kSingleThreadFrames : kReplayFrames;
+}
 
 int make_event_descriptor() {
     const int descriptor = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
@@ -34,8 +41,7 @@ Pipeline::Pipeline(const driver::SensorInfo& sensor, const MethodConfig& method,
       sinks_(std::move(sinks)),
       options_(std::move(options)),
       done_descriptor_(make_event_descriptor()),
-      pool_(sensor.model,
-            options_.live ? kLiveFrames + static_cast<std::size_t>(options_.waiting_frames) : kReplayFrames),
+      pool_(sensor.model, pool_size(options_)),
       to_prepare_(pool_.size()),
       to_odometry_(kQueueLength),
       to_detection_(kQueueLength),
