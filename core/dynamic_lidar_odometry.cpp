@@ -55,11 +55,12 @@ void DynamicLidarOdometry::estimate_pose(Frame& frame, const OdometryFeedback* f
 
 void DynamicLidarOdometry::detect(Frame& frame) {
     frame.detection.clear();
-    if (handle_dynamic_objects_ && frame.odometry.valid) detector_.process(frame);
+    if (handle_dynamic_objects_) detector_.process(frame);
 }
 
 void DynamicLidarOdometry::track(Frame& frame) {
-    if (handle_dynamic_objects_ && frame.odometry.valid) tracker_.process(frame);
+    // A frame without any column has no time to predict to.
+    if (handle_dynamic_objects_ && frame.header.valid_columns > 0) tracker_.process(frame);
 }
 
 void DynamicLidarOdometry::remove_dynamic_points(Frame& frame, OdometryFeedback& feedback) {

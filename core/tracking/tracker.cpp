@@ -131,6 +131,8 @@ Tracker::~Tracker() = default;
 void Tracker::process(Frame& frame) {
     frame.detection.tracks.clear();
     frame.detection.cleared.clear();
+    // A new map: what was tracked stood in the old one.
+    if ((frame.odometry.flags & OdometryResult::kReinitialized) != 0) state_->objects.clear();
     state_->predict(frame);
     if (frame.odometry.valid) {
         state_->associate(frame);
