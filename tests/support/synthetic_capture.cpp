@@ -18,7 +18,6 @@ namespace {
 
 constexpr int kColumnsPerPacket = 16;
 constexpr double kFramePeriod = 0.1;
-constexpr const char* kProfile = "RNG15_RFL8_NIR8";
 
 double altitude_deg(const SyntheticSensor& sensor, int row) {
     return 22.0 - 44.0 * row / (sensor.rows - 1);
@@ -71,6 +70,7 @@ std::vector<std::byte> lidar_packet(const driver::PacketLayout& layout, const Sy
         driver::ColumnHeader header;
         header.time_ns = static_cast<std::uint64_t>(sensor.epoch_ns + static_cast<std::int64_t>(1e9 * time_s));
         header.measurement_id = static_cast<std::uint16_t>(m);
+        header.frame_id = static_cast<std::uint16_t>(frame);
         header.status = layout.valid_status();
         layout.write_column_header(data, i, header);
         // The sensor's axes are the lidar's: the metadata's transform is the identity.
@@ -90,8 +90,8 @@ std::vector<std::byte> lidar_packet(const driver::PacketLayout& layout, const Sy
 
 }  // namespace
 
-SyntheticCapture::SyntheticCapture(int frames, const SyntheticSensor& sensor) {
-    const driver::PacketLayout layout(*driver::find_packet_format(kProfile), sensor.rows, kColumnsPerPacket);
+SyntheticCapture::SyntheticCapture(int frames, const SyntheticSensor& sensor) : sensor_(sensor) {
+    const driver::PacketLayout layout(*driver::find_packet_format(sensor.profile), sensor.rows, kColumnsPerPacket);
     for (int frame = sensor.first_frame; frame < sensor.first_frame + frames; ++frame) {
         for (int m = 0; m < sensor.columns; m += kColumnsPerPacket) {
             const double time_s =
@@ -126,7 +126,7 @@ std::string SyntheticCapture::metadata(const SyntheticSensor& sensor) {
                                    {"pixel_shift_by_row", std::vector<int>(altitude.size(), 0)},
                                    {"pixels_per_column", sensor.rows},
                                    {"udp_profile_imu", "LEGACY"},
-                                   {"udp_profile_lidar", kProfile}}},
+                                   {"udp_profile_lidar", sensor.profile}}},
                                  {"build_rev", sensor.firmware},
                                  {"imu_to_sensor_transform", identity},
                                  {"initialization_id", sensor.init_id},
@@ -154,7 +154,7 @@ std::filesystem::path SyntheticCapture::write(const std::filesystem::path& folde
         if (!writer.write(datagram)) throw std::runtime_error(writer.error());
     }
     if (!writer.flush()) throw std::runtime_error(writer.error());
-    std::ofstream(folder / "drive.json") << metadata();
+    std::ofstream(folder / "drive.json") << metadata(sensor_);
     return capture;
 }
 

@@ -20,6 +20,7 @@ struct SyntheticPacket {
 struct SyntheticSensor {
     int rows = 32;
     int columns = 512;
+    std::string profile = "RNG15_RFL8_NIR8";
     std::uint64_t serial_number = 123456;
     std::uint32_t init_id = 7;
     std::string firmware = "v2.3.0";
@@ -32,7 +33,7 @@ struct SyntheticSensor {
 };
 
 /// A sensor, of 32 x 512 pixels unless said otherwise, at 10 Hz drives at 1 m/s through a hall in which a person walks;
-/// every column is fired from where the sensor is at that moment. Profile RNG15_RFL8_NIR8, IMU at 100 Hz.
+/// every column is fired from where the sensor is at that moment. IMU at 100 Hz.
 class SyntheticCapture {
   public:
     static constexpr int kRows = 32;
@@ -49,6 +50,7 @@ class SyntheticCapture {
     std::filesystem::path write(const std::filesystem::path& folder) const;
 
   private:
+    SyntheticSensor sensor_;
     std::vector<SyntheticPacket> packets_;
 };
 
