@@ -121,6 +121,10 @@ void KalmanFilter::grow(double front_m, double back_m, double left_m, double rig
     move_end(right_m, {along.y(), -along.x()}, kWidth);
 }
 
+void KalmanFilter::doubt_size(double sd_m) {
+    for (int i : {kLength, kWidth}) covariance_(i, i) = std::max(covariance_(i, i), sd_m * sd_m);
+}
+
 double KalmanFilter::plane_distance2(const Eigen::Vector2d& position_m, double age_s,
                                      const Eigen::Matrix2d& covariance) const {
     const Eigen::Vector2d innovation = position_m - (state_.head<2>() - age_s * state_.segment<2>(kVx));

@@ -47,6 +47,9 @@ class KalmanFilter {
     /// any motion.
     void grow(double front_m, double back_m, double left_m, double right_m);
 
+    /// Length and width are known no better than that.
+    void doubt_size(double sd_m);
+
     /// Squared Mahalanobis distance in the ground plane of a position measured with the given covariance.
     double plane_distance2(const Eigen::Vector2d& position_m, double age_s, const Eigen::Matrix2d& covariance) const;
 

@@ -1,6 +1,8 @@
 #include "core/tracking/merged_detections.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 #include "core/tracking/box_iou.hpp"
 
@@ -8,16 +10,23 @@ namespace dlod {
 
 namespace {
 
-constexpr double kInside_m = 0.15;    // the middle of a covered track lies at most this far outside of the detection
-constexpr double kLonger = 1.1;       // a detection of several objects is so much longer than each
-constexpr double kSameObject = 0.35;  // tracks that share more of their footprints are one object seen twice
-constexpr double kMinPart = 10;       // pixels of each part
-constexpr double kMinShare = 0.25;    // of those that its track had: it was not hidden meanwhile
-constexpr double kMoving = 0.5;       // belief from which a track is worth being cut out
-constexpr double kSameSize = 1.3;     // footprint diagonals up to that ratio
-constexpr double kSameSize_m = 0.5;   // and that much more may be the track's
-constexpr double kMargin_m = 0.2;     // what lies so far outside of its box is not
-constexpr double kLong_m = 2.0;       // vehicles
+constexpr double kInside_m = 0.15;     // the middle of a covered track lies at most this far outside of the detection
+constexpr double kLonger = 1.1;        // a detection of several objects is so much longer than each
+constexpr double kSameObject = 0.35;   // tracks that share more of their footprints are one object seen twice
+constexpr double kMinPart = 10;        // pixels of each part
+constexpr double kMinShare = 0.25;     // of those that its track had: it was not hidden meanwhile
+constexpr double kMoving = 0.5;        // belief from which a track is worth being cut out
+constexpr double kSameSize = 1.3;      // footprint diagonals up to that ratio
+constexpr double kSameSize_m = 0.5;    // and that much more may be the track's
+constexpr double kMargin_m = 0.2;      // what lies so far outside of its box is not
+constexpr float kTwoPeople_m = 0.85F;  // two people are together at least that long above the legs, at most twice
+constexpr double kLowest_m = 1.0;      // and so tall
+constexpr double kTallest_m = 2.3;
+constexpr float kGap_m = 0.05F;      // between their upper bodies,
+constexpr float kGapColumns = 1.5F;  // more than neighbouring columns of the image are apart,
+constexpr float kMiddle = 0.3F;      // in the middle of the whole
+constexpr float kApart_m = 0.45F;    // and between their middles: not the halves of one behind a post
+constexpr double kLong_m = 2.0;      // vehicles
 constexpr double kLongMargin_m = 2.0;
 
 double area(const OrientedBox& box) {
@@ -39,6 +48,7 @@ bool same_object(const OrientedBox& a, const OrientedBox& b) {
 void MergedDetections::divide(Frame& frame, DetectionShapes& shapes, std::span<const ExpectedTrack> tracks) {
     const std::size_t count = frame.detection.detections.size();
     cut_.clear();
+    apart_.clear();
     for (std::size_t i = 0; i < count; ++i) {
         const Detection& detection = frame.detection.detections[i];
         covered_.clear();
@@ -57,7 +67,14 @@ void MergedDetections::divide(Frame& frame, DetectionShapes& shapes, std::span<c
         const auto moves_alone = [&](std::size_t t) { return cut_out(detection, shapes, tracks[t]); };
         const bool cut = !divided && std::any_of(covered_.begin(), covered_.end(), moves_alone);
         if (cut) cut_.push_back(i);
-        if (divided || cut) divide_one(frame, shapes, i);
+        const bool moves =
+            std::any_of(covered_.begin(), covered_.end(), [&](std::size_t t) { return tracks[t].motion > kMoving; });
+        const bool apart = !divided && !cut && covered_.size() == 1 && moves && fall_apart(detection, shapes, i);
+        if (!divided && !cut && !apart) continue;
+        divide_one(frame, shapes, i);
+        if (!apart) continue;
+        apart_.push_back(i);
+        apart_.push_back(frame.detection.detections.size() - 1);
     }
 }
 
@@ -104,6 +121,54 @@ bool MergedDetections::cut_out(const Detection& whole, const DetectionShapes& sh
     }
     return static_cast<double>(counts_[0]) >= std::max(kMinPart, kMinShare * track.points) &&
            static_cast<double>(counts_[1]) >= kMinPart;
+}
+
+bool MergedDetections::fall_apart(const Detection& whole, const DetectionShapes& shapes, std::size_t index) {
+    const Eigen::Vector3d size = whole.box.size_m;
+    if (size.z() < kLowest_m || size.z() > kTallest_m || size.head<2>().maxCoeff() < kTwoPeople_m ||
+        size.head<2>().maxCoeff() > 2.0F * kTwoPeople_m) {
+        return false;
+    }
+    const PointSpan points = shapes.points(whole);
+    const double yaw = shapes[index].axis.yaw_rad;
+    const auto c = static_cast<float>(std::cos(yaw)), s = static_cast<float>(std::sin(yaw));
+    const auto middle = static_cast<float>(whole.box.center_m.z() - shapes.origin().z());
+    along_.clear();
+    for (std::size_t i = 0; i < whole.count; ++i) {
+        if (points.z[i] > middle) along_.push_back(c * points.x[i] + s * points.y[i]);
+    }
+    if (along_.size() < static_cast<std::size_t>(kMinPart)) return false;
+    std::sort(along_.begin(), along_.end());
+    const float length = along_.back() - along_.front();
+    if (length < kTwoPeople_m) return false;
+    float gap = 0.0F, border = 0.0F;
+    for (std::size_t i = 1; i < along_.size(); ++i) {
+        if (along_[i] - along_[i - 1] > gap) {
+            gap = along_[i] - along_[i - 1];
+            border = 0.5F * (along_[i] + along_[i - 1]);
+        }
+    }
+    const float range_m = (whole.box.center_m - shapes.origin()).cast<float>().norm();
+    const float place = (border - along_.front()) / length;
+    if (gap < std::max(kGap_m, kGapColumns * column_rad_ * range_m) || place < kMiddle || place > 1.0F - kMiddle)
+        return false;
+    owner_.resize(whole.count);
+    counts_.assign(2, 0);
+    std::array<float, 2> sum{}, low{1e9F, 1e9F}, high{-1e9F, -1e9F};
+    for (std::size_t i = 0; i < whole.count; ++i) {
+        const float u = c * points.x[i] + s * points.y[i];
+        const std::size_t k = u > border ? 1 : 0;
+        owner_[i] = k;
+        ++counts_[k];
+        sum[k] += u;
+        low[k] = std::min(low[k], points.z[i]);
+        high[k] = std::max(high[k], points.z[i]);
+    }
+    for (std::size_t k = 0; k < 2; ++k) {
+        if (static_cast<double>(counts_[k]) < kMinPart || high[k] - low[k] < 0.5F * static_cast<float>(size.z()))
+            return false;
+    }
+    return sum[1] / static_cast<float>(counts_[1]) - sum[0] / static_cast<float>(counts_[0]) > kApart_m;
 }
 
 void MergedDetections::divide_one(Frame& frame, DetectionShapes& shapes, std::size_t index) {

@@ -17,6 +17,7 @@ constexpr int kBlindFrames = 2;            // a prediction is published where no
 constexpr double kVague_m = 0.5;           // and none whose standard deviation is larger
 constexpr double kHeadingSpeed_mps = 0.7;  // slower objects may move sideways
 constexpr double kElongated = 1.6;         // a principal axis says where an object points
+constexpr double kDoubt_m = 0.5;           // in the size of what may have been two
 constexpr double kCutSize_m = 2.0;         // noise of the size of what was cut out by its own box
 constexpr double kVehicle_m = 2.5;         // vehicles are longer than people and cyclists
 constexpr double kDriving_mps = 1.0;
@@ -130,6 +131,7 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
         m.box.yaw_rad = yaw;
         m.yaw_sd_rad = yaw_sd;
         if (sighting.cut) m.size_sd_m.setConstant(kCutSize_m);
+        if (sighting.apart) filter_.doubt_size(kDoubt_m);
         filter_.update(m, config.filter);
         assume_extent(sighting.visibility);
     }

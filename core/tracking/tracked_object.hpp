@@ -18,6 +18,7 @@ struct Sighting {
     std::span<const std::size_t> detections;  ///< indices into the frame's, the largest part first; at least one
     std::size_t shape_parts = 1;  ///< so many of them, the first ones, say where and how large the object is
     bool cut = false;             ///< its largest part was cut out of a larger detection by the object's box
+    bool apart = false;           ///< or is one of two objects that may have been taken for one
     Visibility visibility;
 };
 

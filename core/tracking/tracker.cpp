@@ -14,12 +14,14 @@ namespace dlod {
 
 namespace {
 
-constexpr double kPartMargin_m = 0.15;  // a part's middle lies at most this far outside of the whole object's box
-constexpr double kLimbMargin_m = 0.4;   // and that of a small piece beside a moving object
-constexpr unsigned kLimb = 3;           // small: a third of the object's pixels
-constexpr double kInside = 0.6;         // of its footprint lies inside of those margins
-constexpr double kInsideVehicle = 0.8;  // or of a moving vehicle's box itself
-constexpr double kSimilar = 1.5;        // ratio of footprint diagonals
+constexpr double kPartMargin_m = 0.15;     // a part's middle lies at most this far outside of the whole object's box
+constexpr double kLimbMargin_m = 0.4;      // and that of a small piece beside a moving object
+constexpr double kSplinterMargin_m = 0.8;  // and of a splinter at the corners of a vehicle
+constexpr unsigned kSplinter = 10;         // that is so much smaller
+constexpr unsigned kLimb = 3;              // small: a third of the object's pixels
+constexpr double kInside = 0.6;            // of its footprint lies inside of those margins
+constexpr double kInsideVehicle = 0.8;     // or of a moving vehicle's box itself
+constexpr double kSimilar = 1.5;           // ratio of footprint diagonals
 constexpr double kSameVelocity_mps = 1.0;
 constexpr int kYoungHits = 10;
 constexpr double kRestSize = 1.2;         // the rest of an object is at most so many times as large as it was
@@ -94,7 +96,7 @@ CandidateDetection candidate(const Detection& detection, const DetectionShape& s
 
 struct Tracker::State {
     State(const SensorModel& sensor, const TrackingConfig& tracking)
-        : config(tracking), shapes(sensor), projection(sensor) {
+        : config(tracking), shapes(sensor), projection(sensor), merged(sensor) {
         objects.reserve(static_cast<std::size_t>(tracking.max_tracks));
     }
 
@@ -176,13 +178,14 @@ void Tracker::State::attach_parts(Frame& frame) {
     absorbed.assign(objects.size(), 0);
     for (std::size_t d = 0; d < detections.size(); ++d) {
         const int own = matched[d];
+        if (merged.is_apart(d)) continue;
         double best = 1.0;
         for (std::size_t other = 0; other < detections.size(); ++other) {
             if (matched[other] < 0 || matched[other] == own) continue;
             const auto t = static_cast<std::size_t>(matched[other]);
             const TrackedObject& host = objects[t];
             const TrackedObject* guest = own >= 0 ? &objects[static_cast<std::size_t>(own)] : nullptr;
-            if (!near_footprint(host.box(), detections[d].centroid_m, kLimbMargin_m) || !host.steady()) continue;
+            if (!near_footprint(host.box(), detections[d].centroid_m, kSplinterMargin_m) || !host.steady()) continue;
             const OrientedBox box = host.box();
             // Where a vehicle drives there is nothing else, even if it has been there itself before.
             const bool rest = (detections[d].segment == detections[other].segment && is_rest_of(host, detections[d])) ||
@@ -199,7 +202,8 @@ void Tracker::State::attach_parts(Frame& frame) {
                        kLimb * detections[d].count < detections[other].count) {
                 reach = kLimbMargin_m;
             }
-            if (host.drives()) reach = kLimbMargin_m;
+            if (host.drives())
+                reach = kSplinter * detections[d].count < detections[other].count ? kSplinterMargin_m : kLimbMargin_m;
             const double distance_m = footprint_distance_m(box, detections[d].centroid_m);
             if (distance_m < best * reach && share_inside(detections[d].box, box, reach) > kInside) {
                 best = distance_m / reach;
@@ -226,6 +230,7 @@ Sighting Tracker::State::sighting_of(const Frame& frame, std::size_t t) {
     sighting.shape_parts = static_cast<std::size_t>(
         std::count_if(parts.begin(), parts.end(), [&](std::size_t d) { return limb[d] == 0; }));
     sighting.cut = merged.is_cut(parts.front());
+    sighting.apart = merged.is_apart(parts.front());
     sighting.visibility.sensor_m = frame.odometry.T_world_sensor.translation();
     // Of several parts, the outermost say whether the ends are hidden.
     const Eigen::Vector2d ahead = (detections[parts.front()].centroid_m - sighting.visibility.sensor_m).head<2>();

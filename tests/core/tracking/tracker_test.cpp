@@ -139,6 +139,53 @@ TEST_F(TrackerTest, PeopleWhoMergeInOneSegmentAreDividedAndKeepTheirIds) {
     }
 }
 
+TEST_F(TrackerTest, PeopleWhoWereNeverSeenApartAreToldApartByTheGapBetweenThem) {
+    Tracker tracker(sensor, config);
+    std::set<std::uint32_t> ids;
+    for (int k = 0; k < 40; ++k) {
+        scene.next();
+        const double x = 4.0 + 0.1 * k;
+        auto both = scene.place(person(x, 2.0));
+        const auto b = scene.place(person(x, 2.75));
+        both.insert(both.end(), b.begin(), b.end());
+        scene.detect(both, true);
+        tracker.process(scene.frame);
+        if (k < 10) continue;
+        ASSERT_EQ(scene.frame.detection.tracks.size(), 2U) << k;
+        ASSERT_NE(track_at(x, 2.0), nullptr);
+        ASSERT_NE(track_at(x, 2.75), nullptr);
+        for (const Track& t : scene.frame.detection.tracks) ids.insert(t.id);
+    }
+    EXPECT_EQ(ids.size(), 2U);
+}
+
+// A person who walks along a wall and becomes one segment with it.
+TEST_F(TrackerTest, AWalkerIsCutOutOfTheWallThatHeMergesWith) {
+    Tracker tracker(sensor, config);
+    std::uint32_t id = 0;
+    for (int k = 0; k < 30; ++k) {
+        scene.next();
+        const double x = 4.0 + 0.1 * k;
+        auto walker = scene.place(person(x, 2.0));
+        Cylinder wall = person(x + 1.3, 3.2);
+        wall.moving = false;
+        wall.radius_m = 0.8;
+        wall.points = 150;
+        if (k > 12) {
+            const auto more = scene.place(wall);
+            walker.insert(walker.end(), more.begin(), more.end());
+        }
+        scene.detect(walker, true);
+        tracker.process(scene.frame);
+        const Track* t = track_at(x, 2.0);
+        ASSERT_NE(t, nullptr) << k;
+        if (k == 5) id = t->id;
+        if (k < 6) continue;
+        EXPECT_EQ(t->id, id) << k;
+        EXPECT_LT(t->box.size_m.head<2>().norm(), 1.2) << k;
+    }
+}
+
 // The parts of an object that an occluder splits are one object.
 TEST_F(TrackerTest, SplitPartsJoinTheirTrack) {
     Tracker tracker(sensor, config);
