@@ -25,8 +25,10 @@ void Ingest::run() {
 }
 
 void Ingest::run_until_end() {
-    while (!ended() && !abandoned_.load()) {
+    while (true) {
+        // Drawn before anything is looked at: what happens from here on ends the wait.
         const auto ticket = events_.ticket();
+        if (ended() || abandoned_.load()) return;
         if (!options_.live && !ready()) {
             events_.wait(ticket);
             continue;

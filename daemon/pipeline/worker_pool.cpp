@@ -19,8 +19,10 @@ void WorkerPool::stop() {
 }
 
 void WorkerPool::work() {
-    while (!stopping_.load(std::memory_order_acquire) && !failed()) {
+    while (true) {
+        // Drawn before anything is looked at: what happens from here on ends the wait.
         const auto ticket = events_.ticket();
+        if (stopping_.load(std::memory_order_acquire) || failed()) return;
         if (!run_one()) events_.wait(ticket);
     }
 }

@@ -62,6 +62,17 @@ TEST(WorkerPool, IdleWorkersSleep) {
     EXPECT_LT(cpu_s() - before, 0.03);
 }
 
+TEST(WorkerPool, StopsAtAnyMoment) {
+    for (int i = 0; i < 2000; ++i) {
+        CountingActor some(i % 3);
+        EventCount events;
+        WorkerPool pool({&some}, events, [] {});
+        pool.start(2);
+        for (int spin = 0; spin < i % 50; ++spin) std::this_thread::yield();
+        pool.stop();
+    }
+}
+
 TEST(WorkerPool, AFailureEndsAllWork) {
     class FailingActor final : public Actor {
         bool ready() const override { return true; }
