@@ -71,7 +71,7 @@ struct Odometry::State {
                       const Eigen::Isometry3d& T_world_sensor);
     void see_turn(std::int64_t stamp_ns);
     void write_result(Frame& frame);
-    static void write_nothing(Frame& frame);
+    void write_nothing(Frame& frame) const;
     Eigen::Vector3d mean_force(const Frame& frame) const;
     double median_range(const PointSelection& points);
 
@@ -456,8 +456,14 @@ void Odometry::State::write_result(Frame& frame) {
     if (out.keyframe) keyframes.announce(out.T_world_sensor, out.covariance);
 }
 
-void Odometry::State::write_nothing(Frame& frame) {
+/// Nothing of whichever frame was here before remains: all runs give the same.
+void Odometry::State::write_nothing(Frame& frame) const {
     OdometryResult& out = frame.odometry;
+    out.T_world_sensor = started ? filter.T_world_sensor() : Eigen::Isometry3d::Identity();
+    out.linear_velocity_mps.setZero();
+    out.angular_velocity_radps.setZero();
+    out.covariance.setZero();
+    out.gravity_mps2 = filter.state().gravity_mps2;
     out.valid = false;
     out.keyframe = false;
     out.flags = OdometryResult::kPredictedOnly;
