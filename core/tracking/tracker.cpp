@@ -221,8 +221,10 @@ Sighting Tracker::State::sighting_of(const Frame& frame, std::size_t t) {
     for (std::size_t d = 0; d < detections.size(); ++d) {
         if (owner[d] == static_cast<int>(t)) parts.push_back(d);
     }
-    std::stable_sort(parts.begin(), parts.end(), [&](std::size_t a, std::size_t b) {
-        return limb[a] != limb[b] ? limb[a] < limb[b] : detections[a].count > detections[b].count;
+    // Not stable_sort, which allocates.
+    std::sort(parts.begin(), parts.end(), [&](std::size_t a, std::size_t b) {
+        if (limb[a] != limb[b]) return limb[a] < limb[b];
+        return detections[a].count != detections[b].count ? detections[a].count > detections[b].count : a < b;
     });
     Sighting sighting;
     sighting.detections = parts;
