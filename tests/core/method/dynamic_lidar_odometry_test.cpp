@@ -1,6 +1,7 @@
 #include "core/dynamic_lidar_odometry.hpp"
 
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include <algorithm>
 #include <cmath>
@@ -120,6 +121,25 @@ TEST(DynamicLidarOdometry, NothingMovesAfterARestartInARoomWhereNothingMoves) {
         // Objects of the old place are not those of the new one.
         for (const Track& track : run.frame.detection.tracks) EXPECT_GE(track.id, first_id) << k;
     }
+}
+
+// The reference's path, trajectory and spaciousness grow for ever.
+TEST(DynamicLidarOdometry, MemoryDoesNotGrowWhereTheRobotGoesInCircles) {
+    const auto small_circle = [](double t) {
+        const double u = std::max(0.0, t - 0.5);
+        const double a = 1.6 * (u < 1.0 ? 0.5 * u * u : u - 0.5);
+        return make_pose(so3_exp({0.0, 0.0, a}), {std::sin(a), 1.0 - std::cos(a), 0.0});
+    };
+    DriveOptions options;
+    options.height = 16;
+    MethodRun run(room_with_walker(), options, small_circle);
+    const auto bytes = [] { return static_cast<double>(::mallinfo2().uordblks + ::mallinfo2().hblkhd); };
+    for (int k = 0; k < 120; ++k) run.step(k);
+    const double before = bytes();
+    for (int k = 120; k < 280; ++k) run.step(k);
+    // Four rounds more: the map's last cells, no more than that.
+    EXPECT_LT(bytes() - before, 300e3);
+    EXPECT_LT(run.error_m, 0.1);
 }
 
 TEST(DynamicLidarOdometry, FramesWithoutColumnsOrReturnsAreSurvived) {
