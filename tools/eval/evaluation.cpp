@@ -32,7 +32,12 @@ Json json_of(const Evaluation& evaluation) {
     json["trajectory"] = fields_of(evaluation.trajectory);
     if (evaluation.masks) json["masks"] = fields_of(*evaluation.masks);
     if (evaluation.tracks) json["tracks"] = fields_of(*evaluation.tracks);
+    if (evaluation.tracks_far) json["tracks_far"] = fields_of(*evaluation.tracks_far);
     if (evaluation.map) json["map"] = fields_of(*evaluation.map);
+    if (evaluation.tracks) {
+        for (const MotionErrorRow& row : evaluation.tracks->motion_errors)
+            json["motion_errors"].push_back(fields_of(row));
+    }
     return json;
 }
 
@@ -52,6 +57,7 @@ Evaluation evaluate(const Truth& truth, const RunOutput& run, const EvaluationOp
     if (std::filesystem::exists(run.folder / "labels.bin")) evaluation.masks = score_masks(truth, run, options.skip);
     if (run.has_tracks && !truth.objects.empty()) {
         evaluation.tracks = score_tracking(truth, run, T_true_run, options.range_m, options.skip);
+        evaluation.tracks_far = score_tracking(truth, run, T_true_run, options.far_range_m, options.skip);
     }
     if (std::filesystem::exists(run.folder / "map.pcd") && std::filesystem::exists(truth.folder / "map_static.npy")) {
         evaluation.map = score_map(truth, run.folder / "map.pcd", T_true_run);
@@ -66,10 +72,14 @@ std::string to_json(const Evaluation& evaluation) {
 std::string to_text(const Evaluation& evaluation) {
     const Json json = json_of(evaluation);
     std::string text;
-    for (const auto& [name, score] : json.items()) {
+    const auto add_line = [&](const std::string& name, const Json& score) {
         text += name + ":";
         for (const auto& [field, value] : score.items()) text += "  " + field + "=" + text_of(value);
         text += "\n";
+    };
+    for (const auto& [name, score] : json.items()) {
+        if (!score.is_array()) add_line(name, score);
+        for (const Json& row : score.is_array() ? score : Json::array()) add_line(name, row);
     }
     return text;
 }

@@ -34,6 +34,7 @@ int main(int argc, char** argv) {
     app.add_option("OUT", run_folder, "output folder of the replay")->required()->check(CLI::ExistingDirectory);
     app.add_option("--range", options.range_m, "of tracks, metres; masks are scored within the range of near.bin, 25 m")
         ->capture_default_str();
+    app.add_option("--far-range", options.far_range_m, "of tracks, scored once more, metres")->capture_default_str();
     app.add_option("--skip", options.skip, "frames of start-up left out of mask and track scores")
         ->check(CLI::NonNegativeNumber)
         ->capture_default_str();

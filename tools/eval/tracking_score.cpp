@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <set>
 
 #include "core/tracking/hungarian.hpp"
@@ -17,7 +16,6 @@ constexpr int kVisiblePoints = 40;
 constexpr double kGate_m = 1.0;
 constexpr double kBonusOfSameTrack_m = 0.3;
 constexpr double kForbidden = 1e6;
-constexpr double kHeadingFrom_mps = 0.5;
 
 struct Match {
     std::size_t object, track;
@@ -30,14 +28,6 @@ double gate_m(const TruthObject& object) {
 
 double ground_distance(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
     return (a - b).head<2>().norm();
-}
-
-/// Value below which the share `q` of the sorted values lies, interpolated.
-double quantile(const std::vector<double>& sorted, double q) {
-    const double at = q * static_cast<double>(sorted.size() - 1);
-    const auto below = static_cast<std::size_t>(at);
-    const auto above = std::min(below + 1, sorted.size() - 1);
-    return sorted[below] + (at - static_cast<double>(below)) * (sorted[above] - sorted[below]);
 }
 
 /// Mean of the values that were put in, if any.
@@ -178,11 +168,7 @@ class TrackingScorer {
         if (after == before || from == truth_.objects[before].end() || to == truth_.objects[after].end()) return;
         const double seconds = truth_.last_columns[after].stamp_s - truth_.last_columns[before].stamp_s;
         const Eigen::Vector2d velocity = (to->center_m - from->center_m).head<2>() / seconds;
-        velocity_error_.add((track.velocity_mps.head<2>() - velocity).norm());
-        if (velocity.norm() < kHeadingFrom_mps) return;
-        const double turn =
-            std::atan2(track.velocity_mps.y(), track.velocity_mps.x()) - std::atan2(velocity.y(), velocity.x());
-        heading_error_.add(std::abs(std::remainder(turn, 2.0 * std::numbers::pi)) * 180.0 / std::numbers::pi);
+        motion_errors_.add(track.velocity_mps.head<2>(), velocity);
     }
 
     /// Frames in which objects and tracks are together under the best one-to-one pairing of identities over the run.
@@ -224,13 +210,12 @@ class TrackingScorer {
                 static_cast<double>((match == first_match_.end() ? truth_.frames() : match->second) - seen));
         }
         std::sort(delays.begin(), delays.end());
-        if (!delays.empty()) {
-            score.delay_frames_median = quantile(delays, 0.5);
-            score.delay_frames_p90 = quantile(delays, 0.9);
-        }
+        score.delay_frames_median = quantile(delays, 0.5);
+        score.delay_frames_p90 = quantile(delays, 0.9);
         score.centre_error_m = distance_.value().value_or(0.0);
-        score.velocity_error_mps = velocity_error_.value();
-        score.heading_error_deg = heading_error_.value();
+        score.velocity_error_mps = motion_errors_.mean_velocity_mps();
+        score.heading_error_deg = motion_errors_.mean_heading_deg();
+        score.motion_errors = motion_errors_.table();
         return score;
     }
 
@@ -255,7 +240,8 @@ class TrackingScorer {
     int match_count_ = 0;
     int false_tracks_ = 0;
     int id_switches_ = 0;
-    Mean distance_, velocity_error_, heading_error_;
+    Mean distance_;
+    MotionErrors motion_errors_;
 };
 
 }  // namespace

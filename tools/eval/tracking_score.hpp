@@ -3,7 +3,9 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
+#include "tools/eval/motion_errors.hpp"
 #include "tools/eval/run_output.hpp"
 #include "tools/eval/truth.hpp"
 
@@ -28,6 +30,7 @@ struct TrackingScore {
     /// Of matched tracks, against the objects' displacement over the frames beside; heading only above 0.5 m/s.
     std::optional<double> velocity_error_mps;
     std::optional<double> heading_error_deg;
+    std::vector<MotionErrorRow> motion_errors;  ///< the same over the objects' speed; not visited
 
     template <class V>
     void visit(V& v) const {

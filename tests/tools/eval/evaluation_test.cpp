@@ -134,6 +134,14 @@ TEST(Evaluation, VelocityAndHeadingErrorsAreThoseOfMatchedTracks) {
     const TrackingScore tracks = evaluation_of(drive, {.skip = 12}).tracks.value();
     EXPECT_NEAR(tracks.velocity_error_mps.value(), 0.5, 1e-3);
     EXPECT_NEAR(tracks.heading_error_deg.value(), 0.0, 0.1);
+    const MotionErrorRow& all = tracks.motion_errors.back();
+    EXPECT_GT(all.samples, 0);
+    EXPECT_NEAR(all.velocity_median_mps.value(), 0.5, 1e-3);
+    EXPECT_NEAR(all.speed_bias_mps.value(), 0.5, 1e-3);
+    int samples = 0;
+    for (const MotionErrorRow& row : tracks.motion_errors) samples += row.samples;
+    EXPECT_EQ(samples, 2 * all.samples);  // each is in one band of speed, and in the whole
+    EXPECT_FALSE(tracks.motion_errors.front().velocity_median_mps.has_value());  // nothing is slow
 }
 
 TEST(Evaluation, GhostsAreMapPointsWhereOnlyMovingThingsWere) {
