@@ -155,7 +155,8 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
     cues.shift_m = (filter_.box().center_m - origin_m_).head<2>().norm();
     cues.dt_s = unseen_s_;
     cues.position_m = filter_.box().center_m.head<2>();
-    if (config.state.use_displacement && !clear_without_displacement(cues)) displacement_cue(frame, sighting, cues);
+    if (config.state.use_displacement && !clear_without_displacement(cues))
+        displacement_cue(frame, sighting, shape.age_s, cues);
 
     ++hits_;
     misses_ = 0;
@@ -197,16 +198,18 @@ bool TrackedObject::dead(const TrackingConfig& config) const {
 bool TrackedObject::clear_without_displacement(const MotionCues& cues) const {
     const double share = free_share(cues);
     if (share < 0.0 || hits_ == 0 || agreeing_ > 0) return false;
+    if (drives()) return false;  // its velocity is measured that way
     if (filter_.speed() > kHeadingSpeed_mps && filter_.speed() > 2.0 * filter_.velocity_sd())
         return belief_.state() == DynamicState::kDynamic && share > 0.3;
     if (belief_.state() == DynamicState::kDynamic) return share > 0.3;
     return belief_.state() == DynamicState::kStatic && share < 0.05;
 }
 
-void TrackedObject::displacement_cue(const Frame& frame, const Sighting& sighting, MotionCues& cues) {
+void TrackedObject::displacement_cue(const Frame& frame, const Sighting& sighting, double age_s, MotionCues& cues) {
     PointSample now;
     const Detection& part = frame.detection.detections[sighting.detections.front()];
     sample_points(frame, std::span(frame.detection.pixels).subspan(part.first, part.count), now);
+    now.age_s = age_s;
     const Eigen::Vector2d center = filter_.box().center_m.head<2>();
     if (hits_ == 0) {
         before_ = since_ = now;
@@ -216,11 +219,13 @@ void TrackedObject::displacement_cue(const Frame& frame, const Sighting& sightin
         before_ = since_ = now;
         before_center_m_ = since_center_m_ = center;
     } else {
+        // Between the firings, not the stamps: what moves sideways is met sooner or later by the turning beams.
+        const double elapsed_s = before_.age_s - now.age_s;
         const auto r = register_displacement(before_, now, center - before_center_m_);
-        cues.displacement_log_odds = displacement_log_odds(r, before_.age_s);
+        cues.displacement_log_odds = displacement_log_odds(r, elapsed_s);
         const double length_m = r.displacement_m.norm();
         const auto agrees_with = [&](const Eigen::Vector2d& velocity_mps) {
-            return (r.displacement_m - before_.age_s * velocity_mps).norm() < kAgreement * length_m;
+            return (r.displacement_m - elapsed_s * velocity_mps).norm() < kAgreement * length_m;
         };
         const bool clear = cues.displacement_log_odds > 0.0 && length_m > kAgreeing_m;
         const bool agrees =
@@ -229,10 +234,10 @@ void TrackedObject::displacement_cue(const Frame& frame, const Sighting& sightin
         cues.sustained_displacement = agreeing_ >= kAgreeingFrames;
         cues.left_its_place = cues.sustained_displacement && length_m > kGross_m;
         registered_velocity_mps_.setZero();
-        if (clear) registered_velocity_mps_ = r.displacement_m / before_.age_s;
+        if (clear) registered_velocity_mps_ = r.displacement_m / elapsed_s;
         // The middle of what is seen of a large object is no measure of its motion; its own points are.
         if (agreeing_ >= kTrustedFrames && filter_.box().size_m.head<2>().norm() > kLarge_m)
-            filter_.update_velocity(registered_velocity_mps_, velocity_covariance(r, before_.age_s));
+            filter_.update_velocity(registered_velocity_mps_, velocity_covariance(r, elapsed_s));
     }
     if (since_.age_s > kReference_s || (center - since_center_m_).norm() > kReference_m) {
         before_ = since_;

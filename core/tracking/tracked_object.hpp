@@ -65,7 +65,8 @@ class TrackedObject {
     void assume_extent(const Visibility& visibility);
     bool clear_without_displacement(const MotionCues& cues) const;
     /// Registers this frame's points to earlier ones, and renews those.
-    void displacement_cue(const Frame& frame, const Sighting& sighting, MotionCues& cues);
+    /// @param age_s of the points before the stamp
+    void displacement_cue(const Frame& frame, const Sighting& sighting, double age_s, MotionCues& cues);
     /// Visible box of all parts at one yaw.
     static OrientedBox visible_box(const Frame& frame, const DetectionShapes& shapes, const Sighting& sighting,
                                    double yaw_rad);
