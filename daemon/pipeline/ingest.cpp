@@ -79,8 +79,18 @@ void Ingest::emit(Frame* frame) {
     charge_clocks();
     emitted->times = std::exchange(times_, {});
     emitted->emitted_ns = StepTimer::now_ns(CLOCK_MONOTONIC);
+    emitted->received_ns = emitted->emitted_ns - queueing_ns(*frame);
     emitted_.store(emitted_frames() + 1);
     out_.push(emitted);
+}
+
+/// How long the last packet of a frame waited in the kernel.
+std::int64_t Ingest::queueing_ns(const Frame& frame) const {
+    if (!options_.live) return 0;
+    // Beyond a few seconds it is no delay, but the clock was set in between, or the stamps are not of this host's time.
+    constexpr std::int64_t kPlausible_ns = 10'000'000'000;
+    const std::int64_t delay_ns = StepTimer::now_ns(CLOCK_REALTIME) - frame.header.receive_ns;
+    return delay_ns > 0 && delay_ns < kPlausible_ns ? delay_ns : 0;
 }
 
 void Ingest::start_clocks() {

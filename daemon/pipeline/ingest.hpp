@@ -58,6 +58,7 @@ class Ingest final : public Actor {
     bool step();
     Frame* acquire();
     void emit(Frame* frame);
+    std::int64_t queueing_ns(const Frame& frame) const;
     void start_clocks();
     void charge_clocks();
     void log_warnings();

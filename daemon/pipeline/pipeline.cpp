@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cmath>
 #include <system_error>
 #include <utility>
 
@@ -18,6 +19,9 @@ constexpr std::size_t kSingleThreadFrames = 4;
 constexpr std::size_t kLiveFrames = 13;
 /// Between stages: what is further ahead is only older when its turn comes.
 constexpr std::size_t kQueueLength = 1;
+
+/// Live: a pose that is older than so many turns of the sensor is of no use to a planner.
+constexpr double kMostLatencyPeriods = 2.0;
 
 std::size_t pool_size(const PipelineOptions& options) {
     if (options.live) return kLiveFrames + static_cast<std::size_t>(options.waiting_frames);
@@ -41,6 +45,7 @@ Pipeline::Pipeline(const driver::SensorInfo& sensor, const MethodConfig& method,
       sinks_(std::move(sinks)),
       options_(std::move(options)),
       done_descriptor_(make_event_descriptor()),
+      admission_(options_.live ? std::llround(kMostLatencyPeriods * 1e9 * sensor.model.frame_period_s) : 0),
       pool_(sensor.model, pool_size(options_)),
       to_prepare_(pool_.size()),
       to_odometry_(kQueueLength),
@@ -49,7 +54,7 @@ Pipeline::Pipeline(const driver::SensorInfo& sensor, const MethodConfig& method,
       to_map_(kQueueLength),
       to_write_(kQueueLength),
       prepare_(to_prepare_, to_odometry_, pool_.dropped(),
-               options_.live ? static_cast<std::size_t>(options_.waiting_frames) : 0,
+               options_.live ? static_cast<std::size_t>(options_.waiting_frames) : 0, admission_,
                [this](PipelineFrame& frame) { prepare(frame); }),
       odometry_(
           to_odometry_, to_detection_, [this](PipelineFrame& frame) { estimate_pose(frame); },
@@ -149,6 +154,7 @@ void Pipeline::publish(PipelineFrame& frame) {
     }
     const std::int64_t latency_ns = options_.live ? StepTimer::now_ns(CLOCK_REALTIME) - frame.header.receive_ns
                                                   : StepTimer::now_ns(CLOCK_MONOTONIC) - frame.emitted_ns;
+    admission_.published(frame.admission, StepTimer::now_ns(CLOCK_MONOTONIC));
     frame.latency_ms = static_cast<float>(1e-6 * static_cast<double>(latency_ns));
 }
 

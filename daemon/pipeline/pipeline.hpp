@@ -30,7 +30,7 @@ struct FrameSinks {
 
 struct PipelineOptions {
     int threads = 2;
-    int waiting_frames = 2;  ///< live: more than these are dropped, oldest first
+    int waiting_frames = 2;  ///< live: more than these are dropped, oldest first; so are those that would be late
     bool live = false;       ///< receive on a thread of its own, never wait for the stages
     bool paced = false;      ///< replay in time: the source waits for packets, on a thread of its own
     std::function<void(int)> on_thread_start = {};  ///< on each thread, with its number; the last one receives
@@ -83,6 +83,7 @@ class Pipeline {
     EventCount events_;
     std::array<OdometryFeedback, kFeedbackDelay> feedback_;  ///< of frame n at n % kFeedbackDelay
 
+    Admission admission_;
     FramePool pool_;
     FrameQueue to_prepare_;
     FrameQueue to_odometry_;

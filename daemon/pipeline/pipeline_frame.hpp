@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "core/types/frame.hpp"
+#include "daemon/pipeline/admission.hpp"
 #include "daemon/pipeline/stage_times.hpp"
 
 namespace dlod::daemon {
@@ -12,8 +13,10 @@ struct PipelineFrame : Frame {
     using Frame::Frame;
 
     StageTimes times;
-    std::int64_t emitted_ns = 0;  ///< CLOCK_MONOTONIC when the frame builder gave it out
-    float latency_ms = 0.0F;      ///< from its last packet's receipt to the end of publishing
+    std::int64_t emitted_ns = 0;   ///< CLOCK_MONOTONIC when the frame builder gave it out
+    std::int64_t received_ns = 0;  ///< CLOCK_MONOTONIC when the kernel received its last packet; replay: as emitted_ns
+    Admission::Mark admission;
+    float latency_ms = 0.0F;  ///< from its last packet's receipt to the end of publishing
 };
 
 }  // namespace dlod::daemon

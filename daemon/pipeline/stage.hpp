@@ -4,7 +4,9 @@
 #include <boost/lockfree/spsc_queue.hpp>
 #include <cstdint>
 #include <functional>
+#include <vector>
 
+#include "daemon/pipeline/admission.hpp"
 #include "daemon/pipeline/pipeline_frame.hpp"
 #include "daemon/pipeline/worker_pool.hpp"
 
@@ -28,11 +30,12 @@ class Stage : public Actor {
     }
     void run() override {
         working_.store(true);
-        PipelineFrame* frame = take();
-        work_(*frame);
-        // Counted before it is handed on: who sees the frame behind this stage sees the count, too.
-        completed_.store(completed() + 1);
-        out_.push(frame);
+        if (PipelineFrame* frame = take(); frame != nullptr) {
+            work_(*frame);
+            // Counted before it is handed on: who sees the frame behind this stage sees the count, too.
+            completed_.store(completed() + 1);
+            out_.push(frame);
+        }
         working_.store(false);
     }
     /// Frames worked on so far; what the stage did for them is visible to who reads it.
@@ -41,7 +44,7 @@ class Stage : public Actor {
     bool has_work() const { return working_.load() || in_.read_available() > 0; }
 
   protected:
-    /// The next frame to work on; `in` has one.
+    /// The next frame to work on, or nullptr where none of those in `in`, which has one, is to be worked on.
     virtual PipelineFrame* take() {
         PipelineFrame* frame = nullptr;
         in_.pop(frame);
@@ -58,13 +61,18 @@ class Stage : public Actor {
     std::atomic<bool> working_{false};
 };
 
-/// The first stage. Live, the newest frames win: where more are waiting than may, the oldest are dropped and counted.
+/// The first stage. Live, the newest frames win: where more are waiting than may, and where one would be published too
+/// late, the oldest are dropped and counted.
 class IntakeStage final : public Stage {
   public:
     /// @param dropped takes the frames that are dropped; as large as the pool
     /// @param max_waiting 0: nothing is ever dropped
-    IntakeStage(FrameQueue& in, FrameQueue& out, FrameQueue& dropped, std::size_t max_waiting, Work work)
-        : Stage(in, out, std::move(work)), dropped_(dropped), max_waiting_(max_waiting) {}
+    IntakeStage(FrameQueue& in, FrameQueue& out, FrameQueue& dropped, std::size_t max_waiting, Admission& admission,
+                Work work)
+        : Stage(in, out, std::move(work), [&admission] { return admission.open(); }),
+          dropped_(dropped),
+          max_waiting_(max_waiting),
+          admission_(admission) {}
 
     /// For a thread that is not a worker and needs a frame at any price: takes the oldest one that waits.
     /// @return nullptr where none waits or the stage is at work
@@ -79,6 +87,8 @@ class IntakeStage final : public Stage {
 
     FrameQueue& dropped_;
     std::size_t max_waiting_;
+    Admission& admission_;
+    std::vector<ImuSample> left_behind_;  ///< samples of dropped frames: the odometry integrates the IMU without gaps
     std::atomic<std::uint64_t> dropped_frames_{0};
 };
 

@@ -219,5 +219,25 @@ TEST_F(PipelineTest, LiveTheNewestFramesWinAndEveryDropIsCounted) {
     EXPECT_EQ(imu_samples, imu_packets) << "the samples of dropped frames go on with the next ones";
 }
 
+TEST_F(PipelineTest, LiveWithHalfTheTimeItNeedsLatencyIsBounded) {
+    driver::PacedSource source(std::make_unique<driver::PcapSource>(capture_), 1.0);
+    std::vector<float> latencies_ms;
+    FrameSinks sinks;
+    sinks.publish = [&](PipelineFrame& frame) {
+        ::poll(nullptr, 0, 150);  // beside the other stages' work, as if the CPU were taken away
+        const std::int64_t now_ns = StepTimer::now_ns(CLOCK_MONOTONIC);
+        latencies_ms.push_back(1e-6F * static_cast<float>(now_ns - frame.received_ns));
+    };
+    Pipeline pipeline(sensor_, {}, {}, source, std::move(sinks), {.threads = 2, .live = true});
+    pipeline.start();
+    wait_until_done(pipeline);
+    pipeline.rethrow_failure();
+    EXPECT_GT(pipeline.dropped_frames(), 5U);
+    EXPECT_EQ(pipeline.finished_frames() + pipeline.dropped_frames(), kFrames);
+    // The first ones teach what to expect.
+    ASSERT_GT(latencies_ms.size(), 8U);
+    for (std::size_t i = 6; i < latencies_ms.size(); ++i) EXPECT_LT(latencies_ms[i], 230.0F) << "frame " << i;
+}
+
 }  // namespace
 }  // namespace dlod::daemon
