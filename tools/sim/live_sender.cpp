@@ -9,7 +9,7 @@
 #include <ctime>
 #include <stdexcept>
 
-#include "driver/imu.hpp"
+#include "tools/sim/packet_shift.hpp"
 
 namespace dlod::tools::sim {
 namespace {
@@ -58,29 +58,6 @@ void sleep_until(std::int64_t time_ns) {
     }
 }
 
-/// Moves a packet's times and frame id on, so that the next loop goes on where the last one ended.
-void advance(Datagram& datagram, const driver::PacketLayout& layout, std::int64_t shift_ns, int turns) {
-    if (datagram.imu) {
-        if (const auto sample = driver::decode_imu_packet(datagram.bytes)) {
-            ImuSample moved = *sample;
-            moved.stamp_ns += shift_ns;
-            driver::encode_imu_packet(datagram.bytes, moved, moved.stamp_ns);
-        }
-        return;
-    }
-    if (datagram.bytes.size() != layout.packet_bytes()) return;
-    driver::PacketHeader header = layout.read_packet_header(datagram.bytes);
-    if (header.type != driver::kLidarPacketType) return;
-    header.frame_id += static_cast<std::uint32_t>(turns);
-    layout.write_packet_header(datagram.bytes, header);
-    for (int c = 0; c < layout.columns(); ++c) {
-        driver::ColumnHeader column = layout.read_column_header(datagram.bytes, c);
-        column.time_ns += static_cast<std::uint64_t>(shift_ns);
-        column.frame_id = static_cast<std::uint16_t>(column.frame_id + turns);
-        layout.write_column_header(datagram.bytes, c, column);
-    }
-}
-
 }  // namespace
 
 LiveResult send_live(std::vector<Datagram>& drive, int turns, const driver::SensorInfo& sensor,
@@ -90,12 +67,14 @@ LiveResult send_live(std::vector<Datagram>& drive, int turns, const driver::Sens
     const Outlet imu(options.host, options.imu_port);
     const driver::PacketLayout layout = sensor.layout();
     const std::int64_t length_ns = std::llround(turns * sensor.model.frame_period_s * 1e9);
+    const PacketShift next_loop{.time_ns = length_ns, .frames = static_cast<std::uint32_t>(turns)};
     const std::int64_t begin_ns = monotonic_ns() + 50'000'000;
     LiveResult result;
     for (int loop = 0; loop < options.loops; ++loop) {
         for (std::size_t i = 0; i < drive.size(); ++i) {
             Datagram& d = drive[i];
-            if (loop > 0) advance(d, layout, length_ns, turns);
+            if (loop > 0 && d.imu) shift_imu_packet(d.bytes, next_loop);
+            if (loop > 0 && !d.imu) shift_lidar_packet(d.bytes, layout, next_loop);
             const auto due_ns = static_cast<double>(d.send_ns - kEpoch_ns + loop * length_ns) / options.rate;
             const std::int64_t at_ns = begin_ns + std::llround(due_ns);
             sleep_until(at_ns);

@@ -127,6 +127,7 @@ void add_options(CLI::App& app, Options& o) {
         ->capture_default_str();
     app.add_flag("--start-moving", o.start_moving,
                  "the robot is in motion when the drive starts; else it stands for 1 s");
+    app.add_flag("--lap", o.world.robot.lap, "one lap, ending as it began: the drive can be sent again and again");
     app.add_flag("--no-wobble", o.no_wobble, "no pitch, roll and bob of a walking robot");
     app.add_option("--sensor-height", o.world.robot.sensor_height_m, "above the ground, m")
         ->check(CLI::Range(0.2, 5.0))

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
+#include <string>
 
 #include "core/types/lie.hpp"
 
@@ -16,7 +18,7 @@ constexpr double kSmoothing_s = 0.08;
 /// Speeds allowed along the path: bends taken at a lateral acceleration, braked for in time.
 class SpeedLimit {
   public:
-    SpeedLimit(const ArcPath& path, double speed_mps, double braking_mps2) : path_(path) {
+    SpeedLimit(const ArcPath& path, double speed_mps, double braking_mps2, bool wraps) : path_(path), wraps_(wraps) {
         constexpr double kLateral_mps2 = 2.5;
         const auto n = static_cast<std::size_t>(std::ceil(path.length_m() / kStep_m)) + 1;
         limit_.resize(n);
@@ -24,9 +26,9 @@ class SpeedLimit {
             const double bend = path.curvature(static_cast<double>(i) * kStep_m);
             limit_[i] = std::min(speed_mps, std::sqrt(kLateral_mps2 / std::max(1e-6, bend)));
         }
-        if (!path.closed()) limit_.back() = 0.0;
-        for (int lap = 0; lap < (path.closed() ? 2 : 1); ++lap) {
-            double next = path.closed() ? limit_.front() : limit_.back();
+        if (!wraps) limit_.back() = 0.0;
+        for (int lap = 0; lap < (wraps ? 2 : 1); ++lap) {
+            double next = wraps ? limit_.front() : limit_.back();
             for (std::size_t i = n; i-- > 0;) {
                 limit_[i] = std::min(limit_[i], std::sqrt(next * next + 2.0 * braking_mps2 * kStep_m));
                 next = limit_[i];
@@ -35,7 +37,7 @@ class SpeedLimit {
     }
 
     double at(double s) const {
-        if (path_.closed()) s -= std::floor(s / path_.length_m()) * path_.length_m();
+        if (wraps_) s -= std::floor(s / path_.length_m()) * path_.length_m();
         const auto i = static_cast<std::size_t>(std::clamp(s / kStep_m, 0.0, static_cast<double>(limit_.size() - 1)));
         return limit_[i];
     }
@@ -43,6 +45,7 @@ class SpeedLimit {
   private:
     static constexpr double kStep_m = 0.05;
     const ArcPath& path_;
+    bool wraps_;
     std::vector<double> limit_;
 };
 
@@ -72,20 +75,38 @@ double ramp(double t, double length, double rise) {
 
 RobotMotion::RobotMotion(const ArcPath& path, const Terrain& terrain, const RobotOptions& options, double duration_s) {
     const double acceleration = std::max(1.0, 0.5 * options.speed_mps);
-    const SpeedLimit limit(path, options.speed_mps, acceleration);
+    const SpeedLimit limit(path, options.speed_mps, acceleration, path.closed() && !options.lap);
     const bool from_rest = options.standing_s > 0.0;
     double v = from_rest ? 0.0 : limit.at(0.0);
     double s = from_rest ? 0.0 : -v * kMargin_s;
     double gait = 0.0;
 
     const auto knots = static_cast<int>(std::ceil((duration_s + 2.0 * kMargin_s) / kKnot_s)) + 1;
-    std::vector<Vector6d> samples;
+    std::vector<double> ways_m;
+    std::vector<double> speeds_mps;
     for (int i = 0; i < knots; ++i) {
         const double t = -kMargin_s + i * kKnot_s;
         if (t >= options.standing_s || !from_rest) {
             v = std::clamp(limit.at(s), v - 2.0 * acceleration * kKnot_s, v + acceleration * kKnot_s);
             s += v * kKnot_s;
         }
+        ways_m.push_back(s);
+        speeds_mps.push_back(v);
+    }
+    if (options.lap) {
+        if (!path.closed()) throw std::invalid_argument("a lap is possible in scenes with a closed path only");
+        if (s < path.length_m()) {
+            throw std::invalid_argument("the lap is not complete: after " + std::to_string(duration_s) + " s, " +
+                                        std::to_string(s) + " of " + std::to_string(path.length_m()) + " m");
+        }
+        // It stops a few centimetres too far.
+        for (double& way_m : ways_m) way_m *= path.length_m() / s;
+    }
+    std::vector<Vector6d> samples;
+    for (int i = 0; i < knots; ++i) {
+        const double t = -kMargin_s + i * kKnot_s;
+        s = ways_m[static_cast<std::size_t>(i)];
+        v = speeds_mps[static_cast<std::size_t>(i)];
         // A stride's frequency grows with the speed; who stands does not wobble.
         const double pace = options.wobble ? std::min(1.0, v / 0.8) : 0.0;
         gait += 2.0 * std::numbers::pi * std::min(2.6, 1.5 + 0.3 * v) * kKnot_s * (pace > 0.0 ? 1.0 : 0.0);

@@ -14,6 +14,7 @@ struct RobotOptions {
     double speed_mps = 1.0;
     double standing_s = 1.0;        ///< stands still at first; 0: it is in motion when the drive starts
     double sensor_height_m = 1.2;   ///< above the ground
+    bool lap = false;               ///< stops where it began after one lap of a closed path: such drives can be joined
     bool wobble = true;             ///< a walking robot's pitch, roll and bob
     std::vector<double> kicks_s{};  ///< times at which it is kicked sideways, about 2 g
     std::vector<double> turns_s{};  ///< times at which it turns once about itself, 5 rad/s
