@@ -1,16 +1,21 @@
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <vector>
 
 #include "daemon/commands/commands.hpp"
 #include "daemon/commands/load_config.hpp"
 #include "daemon/doctor/checks.hpp"
+#include "daemon/doctor/packet_check.hpp"
 
 namespace dlod::daemon {
 namespace {
 
 /// What LCM takes an empty URL for.
 constexpr const char* kDefaultLcmUrl = "udpm://239.255.76.67:7667?ttl=0";
+
+/// Long enough to see one lost packet in a thousand.
+constexpr auto kPacketTime = std::chrono::seconds(4);
 
 const char* word_for(Check::Verdict verdict) {
     switch (verdict) {
@@ -30,8 +35,10 @@ ExitCode doctor(const ConfigSources& sources) {
     const Config config = load_config(sources, nullptr);
     std::vector<Check> checks = {check_receive_buffer(config.sensor.receive_buffer_bytes),
                                  check_realtime_priority(config.pipeline.realtime_priority),
-                                 check_locked_memory(config.pipeline.lock_memory), check_clock_synchronised(),
-                                 check_sensor(config.sensor.host)};
+                                 check_locked_memory(config.pipeline.lock_memory),
+                                 check_clock_synchronised(),
+                                 check_sensor(config.sensor.host),
+                                 check_packets(config.sensor, kPacketTime)};
     if (config.lcm.url.empty()) checks.push_back(check_multicast(kDefaultLcmUrl));
     if (!config.lcm.url.empty() && config.lcm.url != "none") checks.push_back(check_multicast(config.lcm.url));
     // Room for an hour of results at 128 x 1024 and 10 Hz.

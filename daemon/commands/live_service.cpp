@@ -19,6 +19,8 @@ using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
 constexpr auto kReportPeriod = std::chrono::seconds(1);
+/// Between attempts to open LCM.
+constexpr auto kAttemptPeriod = std::chrono::seconds(2);
 /// How long new metadata may wait to be looked for.
 constexpr milliseconds kLookPeriod{100};
 
@@ -87,8 +89,7 @@ void LiveService::begin_session_if_asked() {
         next_metadata_ = std::move(metadata);
         if (session_) session_->stop();
     }
-    if (!next_metadata_ || session_ || stopping_) return;
-    waiting_.reset();
+    if (!next_metadata_ || session_ || stopping_ || Clock::now() < next_attempt_) return;
     sensor_ = driver::parse_metadata(next_metadata_->json, next_metadata_->name);
     for (const auto& warning : sensor_->warnings) spdlog::warn("{}", warning);
     try {
@@ -96,8 +97,17 @@ void LiveService::begin_session_if_asked() {
     } catch (const ConfigError& error) {
         spdlog::error("{}; the running configuration stays in force", error.what());
     }
-    session_ = std::make_unique<LiveSession>(config_, *sensor_, next_metadata_->json, start_);
+    try {
+        session_ = std::make_unique<LiveSession>(config_, *sensor_, next_metadata_->json, start_);
+    } catch (const MessageBusError& error) {
+        // The network may come up later than the service.
+        messages_trouble_ = error.what();
+        next_attempt_ = Clock::now() + kAttemptPeriod;
+        return;
+    }
+    messages_trouble_.clear();
     next_metadata_.reset();
+    waiting_.reset();
     session_->start();
 }
 
@@ -110,7 +120,7 @@ void LiveService::end_session() {
 }
 
 void LiveService::report() {
-    const std::string trouble = watch_->trouble();
+    const std::string trouble = messages_trouble_.empty() ? watch_->trouble() : messages_trouble_;
     if (trouble != trouble_ && !trouble.empty()) warnings_.warn(trouble, trouble);
     trouble_ = trouble;
     if (session_) {

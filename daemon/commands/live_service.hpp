@@ -2,6 +2,7 @@
 // another one, reloads the configuration, and reports all the while.
 #pragma once
 
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <string>
@@ -46,7 +47,9 @@ class LiveService {
     LiveStart start_;
     std::unique_ptr<WaitingStatus> waiting_;  ///< while there is no session
     std::unique_ptr<LiveSession> session_;
-    std::string trouble_;  ///< as logged last
+    std::string trouble_;           ///< as logged last
+    std::string messages_trouble_;  ///< why there is no session although there are metadata
+    std::chrono::steady_clock::time_point next_attempt_{};
     bool stopping_ = false;
 };
 

@@ -14,7 +14,7 @@ namespace dlod::daemon {
 /// The status of a service that has no sensor yet: planners and lcm-spy see that it lives and what it waits for.
 class WaitingStatus {
   public:
-    /// @param start_ns CLOCK_MONOTONIC of the service's start @throws MessageBusError
+    /// @param start_ns CLOCK_MONOTONIC of the service's start
     WaitingStatus(const Config& config, std::int64_t start_ns);
 
     /// Once a second. @param trouble with the sensor; empty: none known
@@ -22,6 +22,9 @@ class WaitingStatus {
     std::string one_line() const { return board_.one_line(); }
 
   private:
+    void open_bus();
+
+    std::string url_;
     std::string channel_;
     std::unique_ptr<LcmBus> bus_;
     std::unique_ptr<MessageSender> sender_;

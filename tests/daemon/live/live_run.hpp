@@ -31,6 +31,7 @@ class LiveRun {
         if (!own_network_) GTEST_LOG_(INFO) << "no namespace of its own: on the host's loopback";
     }
     bool usable() const { return subscriber.good(); }
+    bool has_own_network() const { return own_network_; }
 
     /// @param sensor the keys of the group, as in "host: a, lidar_port: 1"; more: whole groups, a line each
     void write_config(const std::string& sensor, const std::string& more = "") const {

@@ -4,7 +4,10 @@
 
 #include <chrono>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <string>
+#include <vector>
 
 #include "tests/daemon/live/live_run.hpp"
 
@@ -15,7 +18,28 @@ using namespace std::chrono_literals;
 
 constexpr std::size_t kFrames = 40;
 
-TEST(Live, NoFrameIsLostFromPacketToSubscriber) {
+std::string content(const std::filesystem::path& file) {
+    std::ifstream stream(file, std::ios::binary);
+    EXPECT_TRUE(stream) << file;
+    return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// What was recorded on the way gives the same results again.
+void expect_same_by_replay(const std::filesystem::path& recording, const std::filesystem::path& live) {
+    std::vector<std::string> command = {DLOD_BINARY, "replay"};
+    for (const auto& entry : std::filesystem::directory_iterator(recording)) {
+        if (entry.path().extension() == ".pcap") command.push_back(entry.path());
+    }
+    ASSERT_EQ(command.size(), 3U) << "one file";
+    command.insert(command.end(), {"--out", (recording / "out").string()});
+    test::ChildProcess replay(command);
+    ASSERT_EQ(replay.wait(60s), 0) << replay.output();
+    for (const char* name : {"trajectory.tum", "labels.bin", "instances.bin", "tracks.csv", "map.pcd"}) {
+        EXPECT_TRUE(content(recording / "out" / name) == content(live / name)) << name << " differs";
+    }
+}
+
+TEST(Live, NoFrameIsLostFromPacketToSubscriberAndTheRecordingGivesTheSame) {
 #ifndef DLOD_SIM_BINARY
     GTEST_SKIP() << "the simulator is not built";
 #else
@@ -25,8 +49,9 @@ TEST(Live, NoFrameIsLostFromPacketToSubscriber) {
     test::ChildProcess sensor({DLOD_SIM_BINARY, "square", "--frames", "1", "--out", run.folder.path()});
     ASSERT_EQ(sensor.wait(30s), 0) << sensor.output();
     run.write_config("metadata: " + (run.folder.path() / "square.json").string() +
-                     ", lidar_port: " + std::to_string(test::kLiveLidarPort) +
-                     ", imu_port: " + std::to_string(test::kLiveImuPort) + ", sender: 127.0.0.1");
+                         ", lidar_port: " + std::to_string(test::kLiveLidarPort) +
+                         ", imu_port: " + std::to_string(test::kLiveImuPort) + ", sender: 127.0.0.1",
+                     "recording: {folder: " + (run.folder.path() / "recording").string() + "}\n");
     run.start({"--out", (run.folder.path() / "out").string()});
 
     test::ChildProcess simulator({DLOD_SIM_BINARY, "square", "--frames", std::to_string(kFrames), "--live",
@@ -71,7 +96,7 @@ TEST(Live, NoFrameIsLostFromPacketToSubscriber) {
                              "pipeline_dropped_frames", "lcm_failed", "output_failures"}) {
         EXPECT_EQ(test::counter(status, loss), 0) << loss;
     }
-    EXPECT_TRUE(std::filesystem::exists(run.folder.path() / "out" / "map.pcd")) << "all outputs are complete";
+    expect_same_by_replay(run.folder.path() / "recording", run.folder.path() / "out");
     ASSERT_EQ(status.stage_name.back(), "latency");
     GTEST_LOG_(INFO) << "latency from the last packet's kernel stamp to the message, ms: p50 "
                      << status.stage_p50.back() << ", p99 " << status.stage_p99.back() << ", max "

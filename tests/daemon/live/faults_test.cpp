@@ -1,0 +1,106 @@
+// Faults injected into the running program: it goes on, and says what is wrong.
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <thread>
+
+#include "tests/daemon/live/live_run.hpp"
+#include "tests/support/fake_sensor.hpp"
+
+namespace dlod {
+namespace {
+
+using namespace std::chrono_literals;
+using test::FakeSensor;
+using test::LiveRun;
+
+test::SyntheticSensor on_live_ports() {
+    test::SyntheticSensor sensor;
+    sensor.lidar_port = test::kLiveLidarPort;
+    sensor.imu_port = test::kLiveImuPort;
+    return sensor;
+}
+
+class Faults : public testing::Test {
+  protected:
+    void SetUp() override {
+        if (!run.usable()) GTEST_SKIP() << "no multicast here";
+        sensor = std::make_unique<FakeSensor>(on_live_ports());
+        run.write_config("host: \"" + sensor->host() + "\"");
+    }
+    auto counted(const char* name) const {
+        return [name](const status_t& status) { return test::counter(status, name) > 0; };
+    }
+
+    LiveRun run;
+    std::unique_ptr<FakeSensor> sensor;
+};
+
+TEST_F(Faults, KilledAndStartedAgainWhileTheSensorsWebServerIsAway) {
+    run.start();
+    EXPECT_TRUE(run.poses_flow());
+    run.daemon->signal(SIGKILL);
+    EXPECT_EQ(run.daemon->wait(5s), 128 + SIGKILL);
+    sensor->answers = false;
+    run.systemd.clear();
+    run.start();
+    EXPECT_TRUE(run.log_says("going on with the metadata that it gave last time"));
+    EXPECT_TRUE(run.poses_flow()) << "the state directory had what is needed";
+    run.stop();
+}
+
+TEST_F(Faults, StoppedForThreeSeconds) {
+    run.start();
+    EXPECT_TRUE(run.poses_flow());
+    run.daemon->signal(SIGSTOP);
+    std::this_thread::sleep_for(3s);
+    run.daemon->signal(SIGCONT);
+    const auto resumed = std::chrono::system_clock::now().time_since_epoch();
+    EXPECT_TRUE(run.poses_flow(5, 5s));
+    const std::int64_t resumed_us = std::chrono::duration_cast<std::chrono::microseconds>(resumed).count();
+    for (const auto& pose : run.subscriber.poses()) {
+        EXPECT_GT(pose.utime, resumed_us - 500'000) << "the newest frames win: what waited for seconds is left out";
+    }
+    EXPECT_TRUE(run.status_says(counted("pipeline_dropped_frames")));
+    run.stop();
+}
+
+TEST_F(Faults, DiskFullWhileRecordingAndWriting) {
+    run.write_config("host: \"" + sensor->host() + "\"",
+                     "recording: {folder: " + (run.folder.path() / "recording").string() + "}\n");
+    run.start({"--out", (run.folder.path() / "out").string()}, 300'000);
+    EXPECT_TRUE(run.status_says(counted("recording_write_failed")));
+    EXPECT_TRUE(run.status_says(counted("output_failures")));
+    EXPECT_TRUE(run.log_says("no more result files are written"));
+    EXPECT_TRUE(run.log_says("tried again every few seconds"));
+    EXPECT_TRUE(run.poses_flow()) << "poses go on";
+    run.stop();
+}
+
+TEST_F(Faults, NetworkOfTheMessagesGoneAndBack) {
+    if (!run.has_own_network()) GTEST_SKIP() << "the host's routes are not touched";
+    run.start();
+    EXPECT_TRUE(run.poses_flow());
+    ASSERT_EQ(std::system("ip route del 224.0.0.0/4 dev lo"), 0);
+    std::this_thread::sleep_for(1s);
+    ASSERT_EQ(std::system("ip route add 224.0.0.0/4 dev lo"), 0);
+    EXPECT_TRUE(run.poses_flow());
+    EXPECT_TRUE(run.status_says(counted("lcm_failed")));
+    run.stop();
+}
+
+TEST_F(Faults, ANetworkOfTheMessagesThatComesLateIsAwaited) {
+    if (!run.has_own_network()) GTEST_SKIP() << "the host's routes are not touched";
+    ASSERT_EQ(std::system("ip route del 224.0.0.0/4 dev lo"), 0);
+    run.start();
+    EXPECT_TRUE(run.systemd.wait_for("LCM cannot be opened", 5s)) << "systemctl status says what it waits for";
+    ASSERT_EQ(std::system("ip route add 224.0.0.0/4 dev lo"), 0);
+    EXPECT_TRUE(run.poses_flow());
+    run.stop();
+}
+
+}  // namespace
+}  // namespace dlod
