@@ -20,8 +20,8 @@ constexpr std::int64_t kLongestTurn_ns =
     1'000'000'000;  // a longer step is the clock's, or a gap in which nothing was seen
 
 constexpr std::size_t kRowStep = 4;
-/// Near pixels lie many to a cell: of the pixels of a row every fourth, every second, every one enters.
-constexpr float kNear_m = 8.0F, kMiddle_m = 16.0F;
+/// Near pixels lie many to a cell: of the pixels of a row every eighth, fourth, second, every one enters.
+constexpr float kNearest_m = 4.0F, kNear_m = 8.0F, kMiddle_m = 16.0F;
 
 /// What one frame adds and clears, kept until it is its turn.
 struct Postponed {
@@ -37,6 +37,20 @@ Persistence::Rule rule_of(const GlobalMapConfig& config) {
 
 std::uint16_t deciseconds(std::int64_t time_ns) {
     return static_cast<std::uint16_t>(time_ns / kDecisecond_ns);
+}
+
+/// 1 for the pixels of a row that enter.
+DLOD_MULTIVERSION
+void mark_row(int width, const std::uint8_t* __restrict label, const float* __restrict range, float min_range_m,
+              float max_range_m, int phase, std::uint8_t* __restrict enters) {
+    for (int c = 0; c < width; ++c) {
+        const bool is_static = (label[c] == static_cast<std::uint8_t>(PixelLabel::kStatic)) |
+                               (label[c] == static_cast<std::uint8_t>(PixelLabel::kGround));
+        const bool in_range = (range[c] >= min_range_m) & (range[c] <= max_range_m);
+        const int skipped =
+            (range[c] < kNearest_m ? 4 : 0) | (range[c] < kNear_m ? 2 : 0) | (range[c] < kMiddle_m ? 1 : 0);
+        enters[c] = static_cast<std::uint8_t>(is_static & in_range & (((c + phase) & skipped) == 0));
+    }
 }
 
 /// out = T p for the points of `pixel`. @param T row-major 3 x 4
@@ -66,6 +80,7 @@ struct GlobalMap::State {
         // As large as it may become, once and for all.
         for (Postponed& p : waiting) p.points.resize(selected_capacity());
         selected.resize(selected_capacity());
+        enters.resize(static_cast<std::size_t>(sensor.width));
     }
 
     /// Pixels of a frame that are looked at, and one beyond them.
@@ -87,6 +102,7 @@ struct GlobalMap::State {
     CellTable cells;
     std::vector<Postponed> waiting;      ///< ring over the frames
     AlignedVector<PixelIndex> selected;  ///< pixels of the frame at hand that enter
+    AlignedVector<std::uint8_t> enters;  ///< of the row at hand
     std::uint64_t frames = 0;
     std::int64_t last_stamp_ns = 0;
     std::int64_t time_ns = 0;          ///< time that has passed, whatever the sensor's clock did
@@ -157,17 +173,12 @@ std::size_t GlobalMap::State::select(const Frame& frame) {
     PixelIndex* const out = selected.data();
     std::size_t count = 0;
     for (std::size_t r = first_row; r < static_cast<std::size_t>(sensor.height); r += kRowStep) {
-        const std::uint8_t* label = frame.detection.label.row(static_cast<int>(r));
-        const float* range = frame.cloud.range_m.row(static_cast<int>(r));
-        const std::size_t phase = frames / kRowStep + r / kRowStep;
+        const int row = static_cast<int>(r);
+        mark_row(sensor.width, frame.detection.label.row(row), frame.cloud.range_m.row(row), min_range, max_range,
+                 static_cast<int>((frames / kRowStep + r / kRowStep) % 8), enters.data());
         for (std::size_t c = 0; c < width; ++c) {
-            const bool is_static = label[c] == static_cast<std::uint8_t>(PixelLabel::kStatic) ||
-                                   label[c] == static_cast<std::uint8_t>(PixelLabel::kGround);
-            const bool in_range = range[c] >= min_range && range[c] <= max_range;
-            const std::size_t skipped = range[c] < kNear_m ? 3 : range[c] < kMiddle_m ? 1 : 0;
-            const bool enters = is_static && in_range && ((c + phase) & skipped) == 0;
             out[count] = static_cast<PixelIndex>(r * width + c);
-            count += enters ? 1 : 0;
+            count += enters[c];
         }
     }
     return count;
