@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <numbers>
 
 #include "core/types/multiversion.hpp"
@@ -9,7 +10,6 @@
 namespace dlod {
 namespace {
 
-constexpr float kUnknownGap = -1e6F;
 constexpr float kFastest_mps = 30.0F;
 constexpr float kUneven = 0.3F;  // what moves away does so at a speed that is constant to that share
 
@@ -20,12 +20,23 @@ struct CompareParameters {
     int narrow_bits, wide_bits;
     std::int32_t wide_begin;
     float occupied_weight;
+    float per_age;  // 1/s; 0: what moves away is not looked for
+};
+
+/// What a comparison finds out about each point.
+struct CompareResults {
+    float* __restrict free;  // sums
+    float* __restrict occupied;
+    float* __restrict fastest;  // bound of the speed
+    float* __restrict gap;      // by how much something nearer hid the point
+    std::uint8_t* __restrict hidden;
 };
 
 DLOD_MULTIVERSION void compare(const CompareParameters& parameters, int n, const std::int32_t* __restrict pixel,
                                const float* __restrict range, const std::uint32_t* __restrict cells,
-                               float* __restrict free_sum, float* __restrict occupied_sum, float* __restrict gap) {
+                               const CompareResults& results) {
     const CompareParameters p = parameters;
+    const CompareResults out = results;
     std::int32_t cell[kChunk];
     for (int begin = 0; begin < n; begin += kChunk) {
         const int count = n - begin < kChunk ? n - begin : kChunk;
@@ -41,13 +52,20 @@ DLOD_MULTIVERSION void compare(const CompareParameters& parameters, int n, const
             const float nearest = static_cast<float>(static_cast<std::int32_t>(seen & 0xFFFFU)) * kReferenceUnit_m;
             const float farthest = static_cast<float>(static_cast<std::int32_t>(seen >> 16U)) * kReferenceUnit_m;
             const float grown = p.margin_per_m * r;
+            const float margin = p.margin + grown;
+            const float gap = r - nearest;
             const bool known = (pixel[begin + i] >= 0) & (seen != 0U);
-            const bool is_free = known & (nearest > r + p.margin + grown);
-            const bool is_occupied =
-                known & (nearest <= r + p.tolerance + grown) & (farthest >= r - p.tolerance - grown);
-            free_sum[begin + i] += is_free ? 1.0F : 0.0F;
-            occupied_sum[begin + i] += is_occupied ? p.occupied_weight : 0.0F;
-            gap[begin + i] = known ? r - nearest : kUnknownGap;
+            const bool is_free = known & (gap < -margin);
+            const bool is_occupied = known & (gap >= -p.tolerance - grown) & (farthest >= r - p.tolerance - grown);
+            out.free[begin + i] += is_free ? 1.0F : 0.0F;
+            out.occupied[begin + i] += is_occupied ? p.occupied_weight : 0.0F;
+            out.gap[begin + i] = gap;
+            const bool is_hidden = known & (gap > margin);
+            out.hidden[begin + i] = is_hidden ? 1 : 0;
+            // Where it was seen at the same place, or almost so, it can only have come slowly.
+            const float fastest = (gap + kUneven * (gap < 0.0F ? -gap : gap) + margin) * p.per_age;
+            const bool bounded = known & !is_free & !is_hidden & (fastest > 0.0F) & (fastest < out.fastest[begin + i]);
+            out.fastest[begin + i] = bounded ? fastest : out.fastest[begin + i];
         }
     }
 }
@@ -76,7 +94,8 @@ FreeSpace::FreeSpace(const SensorModel& sensor, const FreeSpaceConfig& config, i
     pixel_.assign(sensor.pixels(), 0);
     for (auto* v : {&range_, &gap_, &hider_x_, &hider_y_, &hider_z_, &hider_range_}) v->assign(sensor.pixels(), 0.0F);
     hider_pixel_.assign(sensor.pixels(), 0);
-    hidden_.reserve(sensor.pixels());
+    hidden_.assign(sensor.pixels(), 0);
+    behind_.reserve(sensor.pixels());
 }
 
 /// The block that looks at a point, by its azimuth alone.
@@ -96,50 +115,41 @@ void FreeSpace::follow_receding(const Comparison& comparison, const Eigen::Isome
     const auto margin_at = [this](float range) {
         return static_cast<float>(config_.margin_m) + static_cast<float>(config_.margin_per_m) * range;
     };
-    const auto bound_speed = [&](std::size_t i, float gap, float margin) {
-        const float uneven = kUneven * std::abs(gap);
-        points.slowest[i] = std::max(points.slowest[i], (gap - uneven - margin) / comparison.age_s);
-        points.fastest[i] = std::min(points.fastest[i], (gap + uneven + margin) / comparison.age_s);
-    };
-    hidden_.clear();
+    behind_.clear();
     const Eigen::Vector3f origin = T_column_sensor.inverse().translation();
-    for (int k = 0; k < n; ++k) {
-        const auto scratch = static_cast<std::size_t>(k);
-        const auto i = static_cast<std::size_t>(begin + k);
-        const float range = range_[scratch];
-        const float gap = gap_[scratch];
-        const float margin = margin_at(range);
-        if (gap < -margin) continue;
-        if (gap <= margin) {
-            bound_speed(i, gap, margin);
-            continue;
-        }
-        const float share = 1.0F - gap / range;
-        const std::size_t h = hidden_.size();
+    const auto size = static_cast<std::size_t>(n);
+    for (std::size_t k = 0; k < size; ++k) {
+        const void* next = std::memchr(&hidden_[k], 1, size - k);
+        if (next == nullptr) break;
+        k = static_cast<std::size_t>(static_cast<const std::uint8_t*>(next) - hidden_.data());
+        const std::size_t i = static_cast<std::size_t>(begin) + k;
+        const float share = 1.0F - gap_[k] / range_[k];
+        const std::size_t h = behind_.size();
         hider_x_[h] = origin.x() + share * (points.x[i] - origin.x());
         hider_y_[h] = origin.y() + share * (points.y[i] - origin.y());
         hider_z_[h] = origin.z() + share * (points.z[i] - origin.z());
-        hidden_.push_back(k);
+        behind_.push_back(static_cast<std::int32_t>(k));
     }
-    if (hidden_.empty()) return;
+    if (behind_.empty()) return;
     const Reference& now = comparison.now;
     const std::size_t block = block_of({hider_x_[0], hider_y_[0], hider_z_[0]});
-    projection_.project(now.T_block_stamp[block], static_cast<int>(hidden_.size()), hider_x_.data(), hider_y_.data(),
+    projection_.project(now.T_block_stamp[block], static_cast<int>(behind_.size()), hider_x_.data(), hider_y_.data(),
                         hider_z_.data(), now.column_shift.data(), hider_pixel_.data(), hider_range_.data());
-    for (std::size_t h = 0; h < hidden_.size(); ++h) {
-        const auto scratch = static_cast<std::size_t>(hidden_[h]);
-        const auto i = static_cast<std::size_t>(begin + hidden_[h]);
-        const float range = hider_range_[h];
-        const std::uint32_t seen = hider_pixel_[h] < 0 ? 0U : now.cells[cell_of(hider_pixel_[h], range)];
-        const bool gone = static_cast<float>(seen & 0xFFFFU) * kReferenceUnit_m > range + margin_at(range);
-        if (gone) {
+    for (std::size_t h = 0; h < behind_.size(); ++h) {
+        const auto k = static_cast<std::size_t>(behind_[h]);
+        const std::size_t i = static_cast<std::size_t>(begin) + k;
+        const float margin = margin_at(range_[k]);
+        const std::uint32_t seen =
+            hider_pixel_[h] < 0 ? 0U : now.cells[static_cast<std::size_t>(hider_pixel_[h]) >> narrow_bits_];
+        if (static_cast<float>(seen & 0xFFFFU) * kReferenceUnit_m > hider_range_[h] + margin_at(hider_range_[h])) {
             points.gone[i] += 1.0F;
-            bound_speed(i, gap_[scratch], margin_at(range_[scratch]));
-        } else {
-            const std::uint32_t hid = comparison.reference.cells[cell_of(pixel_[scratch], range_[scratch])];
-            const float r = range_[scratch];
-            if (static_cast<float>(hid >> 16U) * kReferenceUnit_m < r - margin_at(r)) points.fastest[i] = 0.0F;
+            points.slowest[i] = std::max(points.slowest[i], ((1.0F - kUneven) * gap_[k] - margin) / comparison.age_s);
+            points.fastest[i] = std::min(points.fastest[i], ((1.0F + kUneven) * gap_[k] + margin) / comparison.age_s);
+            continue;
         }
+        // Still there, where all that was seen in that direction was nearer: an edge.
+        const std::uint32_t hid = comparison.reference.cells[cell_of(pixel_[k], range_[k])];
+        if (static_cast<float>(hid >> 16U) * kReferenceUnit_m < range_[k] - margin) points.fastest[i] = 0.0F;
     }
 }
 
@@ -158,9 +168,11 @@ void FreeSpace::compare_block(const Comparison& comparison, const Eigen::Isometr
                                        narrow_bits_,
                                        wide_bits_,
                                        static_cast<std::int32_t>(late_.size() >> narrow_bits_),
-                                       comparison.occupied_weight};
-    compare(parameters, n, pixel_.data(), range_.data(), comparison.reference.cells.data(), points.free.data() + begin,
-            points.occupied.data() + begin, gap_.data());
+                                       comparison.occupied_weight,
+                                       comparison.recent ? 1.0F / comparison.age_s : 0.0F};
+    const CompareResults results{points.free.data() + begin, points.occupied.data() + begin,
+                                 points.fastest.data() + begin, gap_.data(), hidden_.data()};
+    compare(parameters, n, pixel_.data(), range_.data(), comparison.reference.cells.data(), results);
     if (comparison.recent) follow_receding(comparison, T_column_sensor, begin, n, points);
 }
 

@@ -14,7 +14,7 @@ struct FreeSpaceConfig {
     double margin_m = 0.12;
     double margin_per_m = 0.01;
     double occupied_tolerance_m = 0.1;
-    double near_m = 4.0;
+    double near_m = 2.5;
     int octaves = 6;
     double settle_s = 0.8;
     double receding_s = 1.0;
@@ -92,8 +92,9 @@ class FreeSpace {
     int max_shift_ = 0;
     AlignedVector<std::int32_t> pixel_;  ///< scratch of one block
     AlignedVector<float> range_;
-    AlignedVector<float> gap_;          ///< by how much something nearer hid each point
-    std::vector<std::int32_t> hidden_;  ///< points of the block that something hid
+    AlignedVector<float> gap_;            ///< by how much something nearer hid each point
+    AlignedVector<std::uint8_t> hidden_;  ///< 1: something did
+    std::vector<std::int32_t> behind_;    ///< the block's points of which it did
     AlignedVector<float> hider_x_, hider_y_, hider_z_, hider_range_;
     AlignedVector<std::int32_t> hider_pixel_;
 };

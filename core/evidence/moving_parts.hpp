@@ -16,7 +16,7 @@ struct MovingPartsConfig {
     double min_height_m = 0.15;
     double min_carved_height_m = 0.4;
     int small_segment = 80;
-    double min_free_share = 0.4;
+    double min_free_share = 0.3;
 
     template <class V>
     void visit(V& v) {
