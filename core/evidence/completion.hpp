@@ -11,8 +11,8 @@
 namespace dlod {
 
 struct CompletionConfig {
-    double fringe_m = 0.25;
-    double foot_height_m = 0.03;
+    double fringe_m = 0.4;
+    double foot_height_m = 0.015;
     double max_foot_height_m = 0.35;
 
     template <class V>

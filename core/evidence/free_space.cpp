@@ -10,6 +10,7 @@
 namespace dlod {
 namespace {
 
+constexpr float kUnknownGap = -1e6F;
 constexpr float kFastest_mps = 30.0F;
 constexpr float kUneven = 0.3F;  // what moves away does so at a speed that is constant to that share
 
@@ -20,16 +21,14 @@ struct CompareParameters {
     int narrow_bits, wide_bits;
     std::int32_t wide_begin;
     float occupied_weight;
-    float per_age;  // 1/s; 0: what moves away is not looked for
+    float per_age;  // 1/s
 };
 
 /// What a comparison finds out about each point.
 struct CompareResults {
     float* __restrict free;  // sums
     float* __restrict occupied;
-    float* __restrict fastest;  // bound of the speed
-    float* __restrict gap;      // by how much something nearer hid the point
-    std::uint8_t* __restrict hidden;
+    float* __restrict gap;  // by how much something nearer hid the point
 };
 
 DLOD_MULTIVERSION void compare(const CompareParameters& parameters, int n, const std::int32_t* __restrict pixel,
@@ -59,14 +58,29 @@ DLOD_MULTIVERSION void compare(const CompareParameters& parameters, int n, const
             const bool is_occupied = known & (gap >= -p.tolerance - grown) & (farthest >= r - p.tolerance - grown);
             out.free[begin + i] += is_free ? 1.0F : 0.0F;
             out.occupied[begin + i] += is_occupied ? p.occupied_weight : 0.0F;
-            out.gap[begin + i] = gap;
-            const bool is_hidden = known & (gap > margin);
-            out.hidden[begin + i] = is_hidden ? 1 : 0;
-            // Where it was seen at the same place, or almost so, it can only have come slowly.
-            const float fastest = (gap + kUneven * (gap < 0.0F ? -gap : gap) + margin) * p.per_age;
-            const bool bounded = known & !is_free & !is_hidden & (fastest > 0.0F) & (fastest < out.fastest[begin + i]);
-            out.fastest[begin + i] = bounded ? fastest : out.fastest[begin + i];
+            out.gap[begin + i] = known ? gap : kUnknownGap;
         }
+    }
+}
+
+/// Finds the points that something hid and that may have moved away from there, and bounds the speed of the others.
+DLOD_MULTIVERSION void find_hidden(const CompareParameters& parameters, int n, const float* __restrict range,
+                                   const float* __restrict gaps, float* __restrict fastest_bound,
+                                   std::uint8_t* __restrict hidden) {
+    const CompareParameters p = parameters;
+    for (int i = 0; i < n; ++i) {
+        const float gap = gaps[i];
+        const float margin = p.margin + p.margin_per_m * range[i];
+        const float bound = fastest_bound[i];
+        // Where something far nearer was seen, that went by; where it was seen at the same place, or almost so, it can
+        // only have come slowly.
+        const float slowest = ((1.0F - kUneven) * gap - margin) * p.per_age;
+        const float fastest = (gap + kUneven * std::abs(gap) + margin) * p.per_age;
+        const float of_hidden = slowest > bound ? 0.0F : bound;
+        const float of_seen = fastest < bound ? fastest : bound;
+        const float of_rest = gap >= -margin ? of_seen : bound;
+        fastest_bound[i] = gap > margin ? of_hidden : of_rest;
+        hidden[i] = (gap > margin) & (slowest <= bound) & (bound > 0.0F) ? 1 : 0;
     }
 }
 
@@ -169,11 +183,12 @@ void FreeSpace::compare_block(const Comparison& comparison, const Eigen::Isometr
                                        wide_bits_,
                                        static_cast<std::int32_t>(late_.size() >> narrow_bits_),
                                        comparison.occupied_weight,
-                                       comparison.recent ? 1.0F / comparison.age_s : 0.0F};
-    const CompareResults results{points.free.data() + begin, points.occupied.data() + begin,
-                                 points.fastest.data() + begin, gap_.data(), hidden_.data()};
+                                       1.0F / comparison.age_s};
+    const CompareResults results{points.free.data() + begin, points.occupied.data() + begin, gap_.data()};
     compare(parameters, n, pixel_.data(), range_.data(), comparison.reference.cells.data(), results);
-    if (comparison.recent) follow_receding(comparison, T_column_sensor, begin, n, points);
+    if (!comparison.recent) return;
+    find_hidden(parameters, n, range_.data(), gap_.data(), points.fastest.data() + begin, hidden_.data());
+    follow_receding(comparison, T_column_sensor, begin, n, points);
 }
 
 void FreeSpace::test_block(const Comparison& comparison, int begin, int n, CandidatePoints& points) {

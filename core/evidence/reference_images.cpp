@@ -9,11 +9,8 @@
 namespace dlod {
 namespace {
 
-constexpr int kNarrowRows = 1;  // rows of a window above and below its cell
-constexpr int kWideRows = 2;
 constexpr double kNarrowCell_rad = 0.0062;  // one column of 1024: the window covers three
 constexpr int kWiderBits = 2;               // wide cells have so many bits more
-constexpr std::uint16_t kNone = 65535;      // a missing return in a minimum
 
 DLOD_MULTIVERSION void quantize(int n, const float* __restrict range_m, std::uint16_t* __restrict units) {
     for (int i = 0; i < n; ++i) {
@@ -22,44 +19,82 @@ DLOD_MULTIVERSION void quantize(int n, const float* __restrict range_m, std::uin
     }
 }
 
-DLOD_MULTIVERSION void start_column(int n, const std::uint16_t* __restrict units, std::uint16_t* __restrict low,
-                                    std::uint16_t* __restrict high, std::uint16_t* __restrict missing) {
+// Windows hold the least of (units - 1), where a missing return wraps to the largest number, the greatest of the units,
+// and the number of missing returns.
+
+DLOD_MULTIVERSION void stack_rows(int n, const std::uint16_t* __restrict above, const std::uint16_t* __restrict here,
+                                  const std::uint16_t* __restrict below, std::uint16_t* __restrict low,
+                                  std::uint16_t* __restrict high, std::uint16_t* __restrict missing) {
     for (int i = 0; i < n; ++i) {
-        low[i] = units[i] == 0 ? kNone : units[i];
-        high[i] = units[i];
-        missing[i] = units[i] == 0 ? 1 : 0;
+        const std::uint16_t a = above[i], b = here[i], c = below[i];
+        const auto low_a = static_cast<std::uint16_t>(a - 1);
+        const auto low_b = static_cast<std::uint16_t>(b - 1);
+        const auto low_c = static_cast<std::uint16_t>(c - 1);
+        const std::uint16_t low_ab = low_a < low_b ? low_a : low_b;
+        low[i] = low_ab < low_c ? low_ab : low_c;
+        const std::uint16_t high_ab = a > b ? a : b;
+        high[i] = high_ab > c ? high_ab : c;
+        missing[i] = static_cast<std::uint16_t>((a == 0) + (b == 0) + (c == 0));
     }
 }
 
-DLOD_MULTIVERSION void extend_column(int n, const std::uint16_t* __restrict units, std::uint16_t* __restrict low,
-                                     std::uint16_t* __restrict high, std::uint16_t* __restrict missing) {
+/// Joins the windows of two rows.
+DLOD_MULTIVERSION void join_rows(int n, const std::uint16_t* __restrict low_a, const std::uint16_t* __restrict low_b,
+                                 const std::uint16_t* __restrict high_a, const std::uint16_t* __restrict high_b,
+                                 const std::uint16_t* __restrict missing_a, const std::uint16_t* __restrict missing_b,
+                                 std::uint16_t* __restrict low, std::uint16_t* __restrict high,
+                                 std::uint16_t* __restrict missing) {
     for (int i = 0; i < n; ++i) {
-        const std::uint16_t near = units[i] == 0 ? kNone : units[i];
-        low[i] = near < low[i] ? near : low[i];
-        high[i] = units[i] > high[i] ? units[i] : high[i];
-        missing[i] = static_cast<std::uint16_t>(missing[i] + (units[i] == 0 ? 1 : 0));
+        low[i] = low_a[i] < low_b[i] ? low_a[i] : low_b[i];
+        high[i] = high_a[i] > high_b[i] ? high_a[i] : high_b[i];
+        missing[i] = static_cast<std::uint16_t>(missing_a[i] + missing_b[i]);
     }
 }
 
-/// Widens the windows' extremes by one more column each.
-DLOD_MULTIVERSION void widen(int n, const std::uint16_t* __restrict column_low,
-                             const std::uint16_t* __restrict column_high,
-                             const std::uint16_t* __restrict column_missing, std::uint16_t* __restrict low,
+/// Joins each two neighbours: n windows from 2 n.
+DLOD_MULTIVERSION void halve(int n, const std::uint16_t* __restrict low_in, const std::uint16_t* __restrict high_in,
+                             const std::uint16_t* __restrict missing_in, std::uint16_t* __restrict low,
                              std::uint16_t* __restrict high, std::uint16_t* __restrict missing) {
     for (int i = 0; i < n; ++i) {
-        low[i] = column_low[i] < low[i] ? column_low[i] : low[i];
-        high[i] = column_high[i] > high[i] ? column_high[i] : high[i];
-        missing[i] = static_cast<std::uint16_t>(missing[i] + column_missing[i]);
+        low[i] = low_in[2 * i] < low_in[2 * i + 1] ? low_in[2 * i] : low_in[2 * i + 1];
+        high[i] = high_in[2 * i] > high_in[2 * i + 1] ? high_in[2 * i] : high_in[2 * i + 1];
+        missing[i] = static_cast<std::uint16_t>(missing_in[2 * i] + missing_in[2 * i + 1]);
     }
 }
 
-/// One cell of every `cell`-th window.
-DLOD_MULTIVERSION void pack(int n, int cell, int most_missing, const std::uint16_t* __restrict low,
-                            const std::uint16_t* __restrict high, const std::uint16_t* __restrict missing,
-                            std::uint32_t* __restrict cells) {
+inline std::uint16_t lesser(std::uint16_t a, std::uint16_t b) {
+    return a < b ? a : b;
+}
+
+inline std::uint16_t greater(std::uint16_t a, std::uint16_t b) {
+    return a > b ? a : b;
+}
+
+inline std::uint32_t pack(std::uint16_t low, std::uint16_t high, int missing, int most_missing) {
+    const std::uint32_t packed = (static_cast<std::uint32_t>(high) << 16U) | static_cast<std::uint16_t>(low + 1);
+    return missing <= most_missing ? packed : 0U;
+}
+
+/// Cells of one column: their windows are three wide.
+DLOD_MULTIVERSION void pack_columns(int n, int most_missing, const std::uint16_t* __restrict low,
+                                    const std::uint16_t* __restrict high, const std::uint16_t* __restrict missing,
+                                    std::uint32_t* __restrict cells) {
     for (int i = 0; i < n; ++i) {
-        const std::uint32_t packed = (static_cast<std::uint32_t>(high[i * cell]) << 16U) | low[i * cell];
-        cells[i] = missing[i * cell] <= most_missing ? packed : 0U;
+        cells[i] =
+            pack(lesser(lesser(low[i - 1], low[i]), low[i + 1]), greater(greater(high[i - 1], high[i]), high[i + 1]),
+                 missing[i - 1] + missing[i] + missing[i + 1], most_missing);
+    }
+}
+
+/// Cells of two units: their windows are four wide.
+DLOD_MULTIVERSION void pack_pairs(int n, int most_missing, const std::uint16_t* __restrict low,
+                                  const std::uint16_t* __restrict high, const std::uint16_t* __restrict missing,
+                                  std::uint32_t* __restrict cells) {
+    for (int i = 0; i < n; ++i) {
+        const int k = 2 * i;
+        cells[i] = pack(lesser(lesser(low[k - 1], low[k]), lesser(low[k + 1], low[k + 2])),
+                        greater(greater(high[k - 1], high[k]), greater(high[k + 1], high[k + 2])),
+                        missing[k - 1] + missing[k] + missing[k + 1] + missing[k + 2], most_missing);
     }
 }
 
@@ -86,12 +121,8 @@ ReferenceImages::ReferenceImages(const SensorModel& sensor, int levels)
         reference.T_block_stamp_late.assign(Reference::kBlocks, Eigen::Isometry3f::Identity());
         reference.column_shift.assign(1 + static_cast<std::size_t>(sensor.height), 0.0F);
     }
-    const auto bordered = static_cast<std::size_t>(sensor.width + (4 << wide_bits_));
-    low_.assign(bordered, 0);
-    high_.assign(bordered, 0);
-    missing_.assign(bordered, 0);
-    for (auto* v : {&window_low_, &window_high_, &window_missing_})
-        v->assign(static_cast<std::size_t>(sensor.width), 0);
+    for (Windows& row : rows_) row.resize(sensor.width);
+    for (Windows* windows : {&joined_, &halved_, &halved_again_}) windows->resize(sensor.width);
     selected_.reserve(pool_.size());
 }
 
@@ -158,40 +189,57 @@ void ReferenceImages::fill_poses(const Frame& frame, Reference& reference) const
     }
 }
 
+void ReferenceImages::Windows::resize(int width) {
+    for (auto* v : {&low_values, &high_values, &missing_values})
+        v->assign(kBorder + static_cast<std::size_t>(width) + 2, 0);
+}
+
+void ReferenceImages::Windows::wrap(int n) {
+    for (std::uint16_t* v : {low(), high(), missing()}) {
+        v[-1] = v[n - 1];
+        v[n] = v[0];
+    }
+}
+
+void ReferenceImages::fill_cells(Windows& windows, int rows, int bits, std::uint32_t* cells) {
+    Windows* units = &windows;
+    int n = sensor_.width;
+    for (int bit = 1; bit < bits; ++bit) {
+        Windows* half = units == &halved_ ? &halved_again_ : &halved_;
+        n /= 2;
+        halve(n, units->low(), units->high(), units->missing(), half->low(), half->high(), half->missing());
+        units = half;
+    }
+    units->wrap(n);
+    const int columns = bits == 0 ? 3 : 2 << bits;
+    const int most_missing = rows * columns / 3;
+    const auto fill = bits == 0 ? pack_columns : pack_pairs;
+    fill(sensor_.width >> bits, most_missing, units->low(), units->high(), units->missing(), cells);
+}
+
 void ReferenceImages::fill_windows(const StructuredCloud& cloud, Reference& reference) {
     const int width = sensor_.width;
     const int height = sensor_.height;
     quantize(static_cast<int>(units_.size()), cloud.range_m.data(), units_.data());
-    const auto fill = [&](int half_rows, int bits, std::uint32_t* cells) {
-        const int cell = 1 << bits;
-        const int border = std::max(1, cell / 2);
-        const int most_missing = (2 * half_rows + 1) * (cell + 2 * border) / 3;
-        std::uint16_t* low = low_.data() + border;
-        std::uint16_t* high = high_.data() + border;
-        std::uint16_t* missing = missing_.data() + border;
-        for (int r = 0; r < height; ++r) {
-            const int top = std::max(0, r - half_rows);
-            const int bottom = std::min(height - 1, r + half_rows);
-            start_column(width, units_.row(top), low, high, missing);
-            for (int k = top + 1; k <= bottom; ++k) extend_column(width, units_.row(k), low, high, missing);
-            for (auto* v : {low, high, missing}) {
-                std::copy_n(v, border, v + width);
-                std::copy_n(v + width - border, border, v - border);
-            }
-            std::copy_n(low - border, width, window_low_.data());
-            std::copy_n(high - border, width, window_high_.data());
-            std::copy_n(missing - border, width, window_missing_.data());
-            for (int k = 1 - border; k < cell + border; ++k) {
-                widen(width, low + k, high + k, missing + k, window_low_.data(), window_high_.data(),
-                      window_missing_.data());
-            }
-            pack(width >> bits, cell, most_missing, window_low_.data(), window_high_.data(), window_missing_.data(),
-                 cells);
-            cells += width >> bits;
-        }
+    const auto row = [this](int r) -> Windows& { return rows_[static_cast<std::size_t>(r) % rows_.size()]; };
+    const auto stack = [&](int r) {
+        stack_rows(width, units_.row(std::max(0, r - 1)), units_.row(r), units_.row(std::min(height - 1, r + 1)),
+                   row(r).low(), row(r).high(), row(r).missing());
     };
-    fill(kNarrowRows, narrow_bits_, reference.cells.data());
-    fill(kWideRows, wide_bits_, reference.cells.data() + (sensor_.pixels() >> narrow_bits_));
+    std::uint32_t* narrow = reference.cells.data();
+    std::uint32_t* wide = narrow + (sensor_.pixels() >> narrow_bits_);
+    stack(0);
+    for (int r = 0; r < height; ++r) {
+        if (r + 1 < height) stack(r + 1);
+        fill_cells(row(r), 3, narrow_bits_, narrow);
+        const Windows& above = row(std::max(0, r - 1));
+        const Windows& below = row(std::min(height - 1, r + 1));
+        join_rows(width, above.low(), below.low(), above.high(), below.high(), above.missing(), below.missing(),
+                  joined_.low(), joined_.high(), joined_.missing());
+        fill_cells(joined_, 6, wide_bits_, wide);
+        narrow += width >> narrow_bits_;
+        wide += width >> wide_bits_;
+    }
 }
 
 }  // namespace dlod

@@ -1,6 +1,7 @@
 // What earlier frames saw, kept for free-space evidence: range images at spread ages with the pose of every column.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -62,10 +63,28 @@ class ReferenceImages {
     std::vector<int> users_;  ///< [pool] number of slots that hold it
     std::vector<int> slots_;  ///< [2 * levels] pool index of the two latest multiples of 2^level, -1 none
     std::vector<const Reference*> selected_;
-    Image<std::uint16_t> units_;  ///< ranges of the frame being inserted
-    AlignedVector<std::uint16_t> low_, high_,
-        missing_;  ///< [W + borders] extremes of the pixels above each other, wrapped
-    AlignedVector<std::uint16_t> window_low_, window_high_, window_missing_;  ///< [W] likewise over a row's windows
+    /// Extremes of the pixels of one row's windows; a border of one on both sides, for the image's seam.
+    struct Windows {
+        static constexpr std::size_t kBorder = 32;  // keeps rows aligned
+        AlignedVector<std::uint16_t> low_values, high_values, missing_values;
+
+        void resize(int width);
+        /// Fills the border of n values.
+        void wrap(int n);
+        std::uint16_t* low() { return low_values.data() + kBorder; }
+        std::uint16_t* high() { return high_values.data() + kBorder; }
+        std::uint16_t* missing() { return missing_values.data() + kBorder; }
+        const std::uint16_t* low() const { return low_values.data() + kBorder; }
+        const std::uint16_t* high() const { return high_values.data() + kBorder; }
+        const std::uint16_t* missing() const { return missing_values.data() + kBorder; }
+    };
+
+    /// @param rows of the image that a window covers
+    void fill_cells(Windows& windows, int rows, int bits, std::uint32_t* cells);
+
+    Image<std::uint16_t> units_;   ///< ranges of the frame being inserted
+    std::array<Windows, 3> rows_;  ///< three rows high, of the row at hand and its neighbours
+    Windows joined_, halved_, halved_again_;
 };
 
 }  // namespace dlod

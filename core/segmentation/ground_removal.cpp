@@ -18,11 +18,11 @@ constexpr float kShortestBase_m = 0.3F;   // returns nearer to each other say no
 constexpr int kRowsAbove = 2;             // slopes are taken over so many rows: between adjacent ones noise prevails
 constexpr double kGravityMemory_s = 3.0;  // braking and steps deceive an accelerometer for shorter times
 constexpr int kRowStep = 2;               // of the pixels that the normal of the ground is taken from
-constexpr int kColumnStep = 8;
+constexpr int kColumnStep = 16;
 constexpr float kAround = 5.0F;             // how far the ground around reaches, in heights of the sensor
 constexpr float kAroundTolerance_m = 0.1F;  // of its points from a plane
 constexpr float kAroundSlope = 0.1F;        // growth of that in the first round, with distance
-constexpr int kFewestAround = 100;
+constexpr int kFewestAround = 50;
 constexpr float kMostFromGravity = 0.9F;  // cosine
 constexpr float kUpGain = 0.5F;
 // Range noise allowed in a slope, as a share of what a wall would rise over those rows.
