@@ -100,6 +100,53 @@ INSTANTIATE_TEST_SUITE_P(DynamicLidarOdometry, Sizes,
                                     "from" + std::to_string(test.param.first) + "to" + std::to_string(test.param.last);
                          });
 
+struct Mounting {
+    const char* name;
+    double period_s;
+    Eigen::Vector3d rotation_rad;  ///< of the sensor against the robot
+};
+
+class Mountings : public testing::TestWithParam<Mounting> {};
+
+// Any rate, and any way the sensor is mounted: the world is level whatever the sensor is.
+TEST_P(Mountings, APoseAndAMoverAreFound) {
+    const Mounting& mounting = GetParam();
+    DriveOptions options;
+    options.height = 64;
+    options.period_s = mounting.period_s;
+    MethodRun run(room_with_walker(), options, [&](double t) {
+        Eigen::Isometry3d T = loop(std::max(0.0, t - 0.5));
+        T.linear() = T.linear() * so3_exp(mounting.rotation_rad).toRotationMatrix();
+        return T;
+    });
+    int on_mover = 0, mover = 0, wrong = 0;
+    const int frames = static_cast<int>(std::lround(2.5 / mounting.period_s));
+    for (int k = 0; k < frames; ++k) {
+        run.step(k);
+        ASSERT_TRUE(run.frame.odometry.valid) << k;
+        ASSERT_LT(run.error_m, 0.06) << k;
+        if (k < frames / 2) continue;
+        for (PixelIndex p = 0; p < run.frame.detection.label.size(); ++p) {
+            const bool marked = run.frame.detection.label[p] == static_cast<std::uint8_t>(PixelLabel::kDynamic);
+            const bool moves = run.drive.is_moving(p) && run.frame.cloud.range_m[p] > 0.0F;
+            mover += moves;
+            on_mover += marked && moves;
+            wrong += marked && !moves;
+        }
+    }
+    ASSERT_GT(mover, 100);
+    EXPECT_GT(on_mover, mover / 2);
+    EXPECT_LE(wrong, on_mover / 10 + 20);
+}
+
+INSTANTIATE_TEST_SUITE_P(DynamicLidarOdometry, Mountings,
+                         testing::Values(Mounting{"FiveHertz", 0.2, {0, 0, 0}},
+                                         Mounting{"TwentyHertz", 0.05, {0, 0, 0}},
+                                         Mounting{"Inverted", 0.1, {3.14159, 0, 0}},
+                                         Mounting{"Tilted", 0.1, {0.0, 0.5, 0.0}},
+                                         Mounting{"OnItsSide", 0.1, {1.5708, 0, 0}}),
+                         [](const auto& test) { return test.param.name; });
+
 // After a gap the robot is somewhere else than the map says: what was seen from the old place is no evidence.
 TEST(DynamicLidarOdometry, NothingMovesAfterARestartInARoomWhereNothingMoves) {
     DriveOptions options;
