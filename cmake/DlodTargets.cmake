@@ -19,6 +19,8 @@ function(dlod_add_test_folder folder)
   string(REPLACE "/" "_" name ${folder})
   add_executable(test_${name} ${sources})
   target_link_libraries(test_${name} PRIVATE ${ARG_LINK} dlod_test_main)
+  # The tests' own code compiles a quarter faster so; what they test is optimised in full.
+  target_compile_options(test_${name} PRIVATE $<$<CONFIG:Release>:-O1>)
   string(REGEX MATCH "^[^/]+" top ${folder})
   if(NOT TARGET tests_${top})
     add_custom_target(tests_${top})

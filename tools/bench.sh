@@ -4,13 +4,16 @@
 # usage: tools/bench.sh PCAP [--kernels] [REPLAY_ARGUMENT...]
 #   --kernels   also the kernels one by one (Google Benchmark; needs a build with -DDLOD_BUILD_BENCHMARKS=ON, which
 #               tools/test.sh makes)
-# Needs a build in build/, or in the folder that BUILD_DIR names. Run it on an idle machine.
+# Needs a build of everything (tools/test.sh makes it) in build/, or in the folder that BUILD_DIR names. Run it on an idle
+# machine.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 build=${BUILD_DIR:-$here/../build}
-[[ $# -ge 1 && $1 != -* ]] || { sed -n '2,7s/^# \{0,1\}//p' "$0"; exit 2; }
+[[ $# -ge 1 && $1 != -* ]] || { sed -n '2,8s/^# \{0,1\}//p' "$0"; exit 2; }
 pcap=$1
 shift
+counter=$build/tools/bench/liballocation_counter.so
+[[ -f $counter ]] || { echo "bench: $counter is not there: cmake --build $build" >&2; exit 1; }
 kernels=no
 if [[ ${1:-} == --kernels ]]; then
     kernels=yes
@@ -42,7 +45,7 @@ echo
 head -c $(($(stat -c %s "$pcap") / 2)) "$pcap" >"$work/half.pcap"
 counted() {  # CAPTURE: "allocations bytes peak_kB frames"
     rm -f "$work/allocations"
-    DLOD_ALLOCATION_REPORT=$work/allocations LD_PRELOAD=$build/tools/bench/liballocation_counter.so replay "$@"
+    DLOD_ALLOCATION_REPORT=$work/allocations LD_PRELOAD=$counter replay "$@"
     echo "$(tail -n 1 "$work/allocations") $(awk '/ frames,/ { print $1; exit }' "$work/summary")"
 }
 read -r all_count all_bytes all_peak all_frames < <(counted "$pcap" "$@" --threads 1)

@@ -8,12 +8,17 @@
 namespace dlod::daemon {
 
 const std::vector<Preset>& presets() {
-    // The defaults are those of 128 rows, of which 43 are candidates; with 32 rows as many candidates need more
-    // columns.
+    // The defaults are those of an OS0 with 128 rows. Sensors that see less around them, or less densely, need more of
+    // their pixels as candidates: else too little holds the directions in which a corridor or a street is uniform.
     static const std::vector<Preset> table = {
-        {"OS0", 32, {"subsampling.column_step=3"}},
-        {"OS1", 32, {"subsampling.column_step=3"}},
-        {"OS2", 32, {"subsampling.column_step=3"}},
+        {"OS0", 64, {"subsampling.rows=64", "subsampling.column_step=2"}},
+        {"OS0", 32, {"subsampling.column_step=1"}},
+        {"OS1", 128, {"subsampling.column_step=2"}},
+        {"OS1", 64, {"subsampling.rows=64", "subsampling.column_step=2"}},
+        {"OS1", 32, {"subsampling.column_step=1"}},
+        {"OS2", 128, {"subsampling.column_step=2"}},
+        {"OS2", 64, {"subsampling.rows=64", "subsampling.column_step=2"}},
+        {"OS2", 32, {"subsampling.column_step=1"}},
     };
     return table;
 }
