@@ -9,9 +9,9 @@ namespace dlod {
 
 namespace {
 
-constexpr std::size_t kPoints = 80;  // are enough, evenly taken
+constexpr std::size_t kPoints = 48;  // are enough, evenly taken
 constexpr std::size_t kFewest = 12;
-constexpr int kDirections = 24;
+constexpr int kDirections = 18;
 constexpr int kRefinements = 3;
 constexpr float kFar_m = 0.3F;  // what is farther from all sides is no part of one
 constexpr double kClear = 0.6;  // of the mean cost of all directions

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/types/multiversion.hpp"
+
 namespace dlod {
 
 namespace {
@@ -53,33 +55,27 @@ bool normal_at(const Frame& frame, PixelIndex pixel, Eigen::Vector3f& normal) {
     return true;
 }
 
-struct Match {
-    float normal_x = 0.0F, normal_y = 0.0F, distance_m = 0.0F;
-    bool found = false;
-};
+using Lanes = std::array<float, PointSample::kCapacity>;
 
-/// The nearest point before, and the distance to its tangent plane, of a point that is moved back by d.
-Match match(const PointSample& before, const PointSample& now, std::size_t i, const Eigen::Vector3f& between,
-            const Eigen::Vector2f& d) {
-    const float px = now.x[i] + between.x() - d.x();
-    const float py = now.y[i] + between.y() - d.y();
-    const float pz = now.z[i] + between.z();
-    float nearest = std::numeric_limits<float>::max();
-    std::size_t index = 0;
-    for (std::size_t j = 0; j < before.size; ++j) {
-        const float dx = px - before.x[j], dy = py - before.y[j], dz = pz - before.z[j];
-        const float d2 = dx * dx + dy * dy + dz * dz;
-        if (d2 < nearest) {
-            nearest = d2;
-            index = j;
+/// Of each point the nearest one before. All lanes run to the capacity: no remainder, whatever the sizes.
+DLOD_MULTIVERSION void nearest(std::size_t before, const float* __restrict bx, const float* __restrict by,
+                               const float* __restrict bz, const float* __restrict px, const float* __restrict py,
+                               const float* __restrict pz, float* __restrict distance2,
+                               std::int32_t* __restrict index) {
+    for (std::size_t i = 0; i < PointSample::kCapacity; ++i) {
+        distance2[i] = std::numeric_limits<float>::max();
+        index[i] = 0;
+    }
+    for (std::size_t j = 0; j < before; ++j) {
+        const float x = bx[j], y = by[j], z = bz[j];
+        const auto at = static_cast<std::int32_t>(j);
+        for (std::size_t i = 0; i < PointSample::kCapacity; ++i) {
+            const float dx = px[i] - x, dy = py[i] - y, dz = pz[i] - z;
+            const float d2 = dx * dx + dy * dy + dz * dz;
+            index[i] = d2 < distance2[i] ? at : index[i];
+            distance2[i] = d2 < distance2[i] ? d2 : distance2[i];
         }
     }
-    Match m;
-    m.found = nearest < kMaxNeighbour_m * kMaxNeighbour_m;
-    m.normal_x = before.nx[index];
-    m.normal_y = before.ny[index];
-    m.distance_m = m.normal_x * (px - before.x[index]) + m.normal_y * (py - before.y[index]);
-    return m;
 }
 
 /// Cost of a displacement and, for the next Gauss-Newton step, its normal equations.
@@ -91,21 +87,40 @@ struct Fit {
     int in_place = 0;
 };
 
+/// Distances of the points, moved back by d, to the tangent planes of the nearest points before.
 Fit fit(const PointSample& before, const PointSample& now, const Eigen::Vector2d& d) {
     Fit f;
     const Eigen::Vector3f between = (now.origin_m - before.origin_m).cast<float>();
+    const auto back_x = between.x() - static_cast<float>(d.x()), back_y = between.y() - static_cast<float>(d.y());
+    Lanes px, py, pz, distance2;
+    std::array<std::int32_t, PointSample::kCapacity> index;
+    for (std::size_t i = 0; i < PointSample::kCapacity; ++i) {
+        px[i] = now.x[i] + back_x;
+        py[i] = now.y[i] + back_y;
+        pz[i] = now.z[i] + between.z();
+    }
+    nearest(before.size, before.x.data(), before.y.data(), before.z.data(), px.data(), py.data(), pz.data(),
+            distance2.data(), index.data());
+    float xx = 0.0F, xy = 0.0F, yy = 0.0F, gx = 0.0F, gy = 0.0F, cost = 0.0F;
     for (std::size_t i = 0; i < now.size; ++i) {
-        const Match m = match(before, now, i, between, d.cast<float>());
-        const float bounded = m.found ? std::min(std::abs(m.distance_m), kOutlier_m) : kOutlier_m;
-        f.cost_m2 += bounded * bounded;
+        const auto j = static_cast<std::size_t>(index[i]);
+        const float nx = before.nx[j], ny = before.ny[j];
+        const float distance_m = nx * (px[i] - before.x[j]) + ny * (py[i] - before.y[j]);
+        const bool found = distance2[i] < kMaxNeighbour_m * kMaxNeighbour_m;
+        const float bounded = found ? std::min(std::abs(distance_m), kOutlier_m) : kOutlier_m;
+        cost += bounded * bounded;
         if (bounded < kInPlace_m) ++f.in_place;
-        if (!m.found || std::abs(m.distance_m) > 2.0F * kOutlier_m) continue;
-        const Eigen::Vector2d n(m.normal_x, m.normal_y);
-        f.information += n * n.transpose();
-        f.gradient += n * static_cast<double>(m.distance_m);
+        if (!found || std::abs(distance_m) > 2.0F * kOutlier_m) continue;
+        xx += nx * nx;
+        xy += nx * ny;
+        yy += ny * ny;
+        gx += nx * distance_m;
+        gy += ny * distance_m;
         ++f.inliers;
     }
-    f.cost_m2 /= static_cast<double>(std::max<std::size_t>(1, now.size));
+    f.information << xx, xy, xy, yy;
+    f.gradient << gx, gy;
+    f.cost_m2 = cost / static_cast<double>(std::max<std::size_t>(1, now.size));
     return f;
 }
 

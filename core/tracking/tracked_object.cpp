@@ -22,6 +22,7 @@ constexpr double kCutSize_m = 2.0;         // noise of the size of what was cut 
 constexpr double kVehicle_m = 2.5;         // vehicles are longer than people and cyclists
 constexpr double kDriving_mps = 1.0;
 constexpr double kLong_m = 1.5;        // sides of that length say it better
+constexpr int kSidesFrames = 5;        // between two looks at them where an object rests
 constexpr double kMostSlip_rad = 0.6;  // between an object's heading and its sides
 constexpr double kAgreeing_m = 0.3;    // a shorter displacement may be noise
 constexpr double kAgreement = 0.4;     // of its length, from what the velocity predicts
@@ -95,8 +96,9 @@ std::pair<double, double> TrackedObject::measured_yaw(const PointSpan& points) {
     const bool heads = speed > kHeadingSpeed_mps && speed > 2.0 * sd;
     const double heading = heads ? std::atan2(velocity.y(), velocity.x()) : filter_.box().yaw_rad;
     if (heads) filter_.align_axes(heading);
-    // The sides of a long object are known better than its heading.
-    if (std::max(filter_.box().size_m.head<2>().maxCoeff(), visible_.size_m.head<2>().maxCoeff()) > kLong_m) {
+    // The sides of a long object are known better than its heading; those of a thing at rest do not turn.
+    const bool rests = belief_.state() == DynamicState::kStatic && age_ % kSidesFrames != 0;
+    if (!rests && std::max(filter_.box().size_m.head<2>().maxCoeff(), visible_.size_m.head<2>().maxCoeff()) > kLong_m) {
         if (const auto sides = rectangle_yaw(points)) {
             const double turn = std::remainder(*sides - heading, 0.5 * std::numbers::pi);
             if (!heads || std::abs(turn) < kMostSlip_rad) return {wrap_angle(heading + turn), 0.1};
