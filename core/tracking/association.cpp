@@ -10,8 +10,8 @@ namespace dlod {
 
 namespace {
 
-constexpr double kBeyond = 2.0;      // any gated distance above 1
-constexpr double kMaxSlack_m = 6.0;  // of the boxes of the largest vehicles
+constexpr double kBeyond = 2.0;    // any gated distance above 1
+constexpr double kSweep_s = 0.21;  // a detection's points are no older than a turn of the sensor takes
 constexpr double kSlack_m = 0.1;
 constexpr double kSlackOfSize = 0.15;
 // Where two tracks compete for one detection, the other part of the object was hidden, or two parts are seen as one
@@ -64,8 +64,6 @@ Eigen::Vector2d offset_from_inside(const OrientedBox& whole, const OrientedBox& 
 /// Against the visible box of the last sighting or, where the object is seen better or worse than then, its whole box.
 Comparison compare(const ExpectedTrack& track, const CandidateDetection& detection, const AssociationConfig& config) {
     const Eigen::Vector2d offset = (detection.visible.center_m - track.visible.center_m).head<2>();
-    const double farthest = config.max_speed_mps * track.dt_s + kMaxSlack_m;
-    if (offset.squaredNorm() > farthest * farthest) return {};
     // Visible boxes shift by a part of their size when limbs and sides come and go.
     const double size = detection.visible.size_m.head<2>().norm();
     const double slack = kSlack_m + kSlackOfSize * std::min(track.visible.size_m.head<2>().norm(), size);
@@ -112,15 +110,44 @@ double Association::cost(double iou, int points_a, int points_b, const Associati
     return config.alpha * (1.0 - iou) + config.beta * relative_difference(points_a, points_b);
 }
 
+// Most pairs are far apart: they are not to cost more than a glance.
+void Association::set_reaches(std::span<const ExpectedTrack> tracks, std::span<const CandidateDetection> detections,
+                              const AssociationConfig& config) {
+    track_reach_.clear();
+    for (const ExpectedTrack& track : tracks) {
+        const double size = std::max(track.visible.size_m.head<2>().norm(), track.whole.size_m.head<2>().norm());
+        const double slack = kSlack_m + kSlackOfSize * size;
+        double reach = config.max_speed_mps * track.dt_s + slack;
+        if (!track.young) {
+            const double sd = track.filter->position_sd() + kSweep_s * track.filter->velocity_sd();
+            const double moved = kSweep_s * track.filter->speed();  // before its points are seen
+            reach = std::min(reach, moved + config.gate_sigma * std::hypot(sd, slack));
+        }
+        const double between = (track.visible.center_m - track.whole.center_m).head<2>().norm();
+        track_reach_.push_back(reach + between + 0.5 * size);
+    }
+    detection_reach_.clear();
+    for (const CandidateDetection& detection : detections)
+        detection_reach_.push_back(0.5 * detection.visible.size_m.head<2>().norm());
+}
+
+bool Association::near(std::span<const ExpectedTrack> tracks, std::span<const CandidateDetection> detections,
+                       std::size_t t, std::size_t d) const {
+    const double reach = track_reach_[t] + detection_reach_[d];
+    return (detections[d].visible.center_m - tracks[t].whole.center_m).head<2>().squaredNorm() <= reach * reach;
+}
+
 const std::vector<int>& Association::solve(std::span<const ExpectedTrack> tracks,
                                            std::span<const CandidateDetection> detections,
                                            const AssociationConfig& config) {
     detection_of_.assign(tracks.size(), -1);
     track_of_.assign(detections.size(), -1);
+    set_reaches(tracks, detections, config);
 
     pairs_.clear();
     for (std::size_t t = 0; t < tracks.size(); ++t) {
         for (std::size_t d = 0; d < detections.size(); ++d) {
+            if (!near(tracks, detections, t, d)) continue;
             const ExpectedTrack& track = tracks[t];
             const CandidateDetection& detection = detections[d];
             const Comparison boxes = compare(track, detection, config);
@@ -139,7 +166,7 @@ const std::vector<int>& Association::solve(std::span<const ExpectedTrack> tracks
     for (std::size_t t = 0; t < tracks.size(); ++t) {
         if (detection_of_[t] >= 0) continue;
         for (std::size_t d = 0; d < detections.size(); ++d) {
-            if (track_of_[d] >= 0) continue;
+            if (track_of_[d] >= 0 || !near(tracks, detections, t, d)) continue;
             const ExpectedTrack& track = tracks[t];
             const CandidateDetection& detection = detections[d];
             const double distance = compare(track, detection, config).distance;

@@ -48,13 +48,18 @@ class Association {
         int detection = 0;
         double cost = 0.0;
     };
+    void set_reaches(std::span<const ExpectedTrack> tracks, std::span<const CandidateDetection> detections,
+                     const AssociationConfig& config);
+    /// False where a pair is surely beyond the gate.
+    bool near(std::span<const ExpectedTrack> tracks, std::span<const CandidateDetection> detections, std::size_t t,
+              std::size_t d) const;
     void assign(std::size_t tracks, std::size_t detections, double unmatched_cost);
     void assign_component(std::size_t first, std::size_t last, double unmatched_cost);
 
     Hungarian hungarian_;
     std::vector<Pair> pairs_;
     std::vector<int> detection_of_, track_of_, component_, row_of_, column_of_, rows_, columns_;
-    std::vector<double> cost_;
+    std::vector<double> cost_, track_reach_, detection_reach_;
 };
 
 }  // namespace dlod

@@ -13,16 +13,6 @@ namespace {
 
 constexpr int kMeasured = 7;
 constexpr double kGrowthDoubt = 0.5;  // standard deviation of a growth, in itself
-using MeasurementCovariance = Eigen::Matrix<double, kMeasured, kMeasured>;
-
-MeasurementCovariance noise_of(const BoxMeasurement& m) {
-    MeasurementCovariance R = MeasurementCovariance::Zero();
-    R.topLeftCorner<2, 2>() = m.plane_covariance;
-    R(2, 2) = m.z_sd_m * m.z_sd_m;
-    R(3, 3) = m.yaw_sd_rad * m.yaw_sd_rad;
-    R.diagonal().tail<3>() = m.size_sd_m.cwiseAbs2();
-    return R;
-}
 
 double largest_sd(const Eigen::Matrix2d& covariance) {
     const double a = covariance(0, 0), b = covariance(1, 1), c = covariance(0, 1);
@@ -34,7 +24,10 @@ double largest_sd(const Eigen::Matrix2d& covariance) {
 KalmanFilter::KalmanFilter(const BoxMeasurement& first, const KalmanConfig& config) {
     state_ << first.box.center_m, wrap_angle(first.box.yaw_rad), first.box.size_m, Eigen::Vector3d::Zero();
     covariance_.setZero();
-    covariance_.topLeftCorner<kMeasured, kMeasured>() = noise_of(first);
+    covariance_.topLeftCorner<2, 2>() = first.plane_covariance;
+    covariance_(kZ, kZ) = first.z_sd_m * first.z_sd_m;
+    covariance_(kYaw, kYaw) = first.yaw_sd_rad * first.yaw_sd_rad;
+    covariance_.diagonal().segment<3>(kLength) = first.size_sd_m.cwiseAbs2();
     covariance_(kVx, kVx) = covariance_(kVy, kVy) = config.birth_velocity_sd_mps * config.birth_velocity_sd_mps;
     covariance_(kVz, kVz) = config.birth_vertical_velocity_sd_mps * config.birth_vertical_velocity_sd_mps;
 }
@@ -61,22 +54,33 @@ void KalmanFilter::predict(double dt_s, const KalmanConfig& config) {
         covariance_(i, i) += config.size_rate_sd_mps * config.size_rate_sd_mps * dt * dt;
 }
 
+void KalmanFilter::update_one(const Row& measures, double innovation, double variance) {
+    // Few of a row's entries are not zero: the position, and the velocity for the age of the points.
+    State PHt = State::Zero();
+    double expected = variance;
+    for (const auto& [state, factor] : measures) {
+        if (factor != 0.0) PHt += factor * covariance_.col(state);
+    }
+    for (const auto& [state, factor] : measures) expected += factor * PHt(state);
+    state_ += (innovation / expected) * PHt;
+    for (int i = 0; i < kStates; ++i) covariance_.col(i) -= (PHt(i) / expected) * PHt;
+}
+
 void KalmanFilter::update(const BoxMeasurement& m, const KalmanConfig& config) {
-    // H = [I7 | 0] and, as the points are older than the stamp, -age * velocity on the position.
-    Eigen::Matrix<double, kMeasured, kStates> H = Eigen::Matrix<double, kMeasured, kStates>::Identity();
-    for (int i = 0; i < 3; ++i) H(i, kVx + i) = -m.age_s;
-
-    Eigen::Matrix<double, kMeasured, 1> innovation;
-    innovation << m.box.center_m - (state_.head<3>() - m.age_s * state_.segment<3>(kVx)),
-        std::remainder(m.box.yaw_rad - state_(kYaw), std::numbers::pi), m.box.size_m - state_.segment<3>(kLength);
-
-    const MeasurementCovariance R = noise_of(m);
-    const Eigen::Matrix<double, kStates, kMeasured> PHt = covariance_ * H.transpose();
-    const Eigen::LLT<MeasurementCovariance> S(H * PHt + R);
-    const Eigen::Matrix<double, kStates, kMeasured> K = S.solve(PHt.transpose()).transpose();
-    state_ += K * innovation;
-    const Covariance I_KH = Covariance::Identity() - K * H;
-    covariance_ = I_KH * covariance_ * I_KH.transpose() + K * R * K.transpose();
+    // One measured number after the other, which inverts nothing; those of the plane are made independent first.
+    // As the points are older than the stamp, a position is measured less age * velocity.
+    const Eigen::Vector3d position = m.box.center_m;
+    const double shared = m.plane_covariance(0, 1) / m.plane_covariance(0, 0);
+    const auto seen = [&](int axis) { return position(axis) - (state_(axis) - m.age_s * state_(kVx + axis)); };
+    update_one({{{kX, 1.0}, {kVx, -m.age_s}, {kY, 0.0}, {kVy, 0.0}}}, seen(0), m.plane_covariance(0, 0));
+    update_one({{{kY, 1.0}, {kVy, -m.age_s}, {kX, -shared}, {kVx, shared * m.age_s}}}, seen(1) - shared * seen(0),
+               m.plane_covariance(1, 1) - shared * m.plane_covariance(0, 1));
+    update_one({{{kZ, 1.0}, {kVz, -m.age_s}, {kX, 0.0}, {kY, 0.0}}}, seen(2), m.z_sd_m * m.z_sd_m);
+    const auto update_state = [&](int state, double innovation, double sd) {
+        update_one({{{state, 1.0}, {state, 0.0}, {state, 0.0}, {state, 0.0}}}, innovation, sd * sd);
+    };
+    update_state(kYaw, std::remainder(m.box.yaw_rad - state_(kYaw), std::numbers::pi), m.yaw_sd_rad);
+    for (int i = 0; i < 3; ++i) update_state(kLength + i, m.box.size_m(i) - state_(kLength + i), m.size_sd_m(i));
     covariance_ = (0.5 * (covariance_ + covariance_.transpose())).eval();
 
     state_(kYaw) = wrap_angle(state_(kYaw));

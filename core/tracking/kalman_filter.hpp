@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <utility>
 
 #include "core/tracking/tracking_config.hpp"
 #include "core/types/oriented_box.hpp"
@@ -33,7 +35,7 @@ class KalmanFilter {
     /// Moves the state on by dt seconds, at least 0.
     void predict(double dt_s, const KalmanConfig& config);
 
-    /// Joseph form: the covariance stays symmetric and positive definite.
+    /// The covariance stays symmetric and positive definite.
     void update(const BoxMeasurement& measurement, const KalmanConfig& config);
 
     /// Takes in a velocity in the ground plane, measured apart from the box.
@@ -66,6 +68,10 @@ class KalmanFilter {
     const Covariance& covariance() const { return covariance_; }
 
   private:
+    /// Which states a measured number is the sum of, and by which factors.
+    using Row = std::array<std::pair<int, double>, 4>;
+    void update_one(const Row& measures, double innovation, double variance);
+
     enum Index { kX, kY, kZ, kYaw, kLength, kWidth, kHeight, kVx, kVy, kVz };
 
     State state_;
