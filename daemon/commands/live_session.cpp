@@ -55,6 +55,7 @@ std::int64_t monotonic_ns() {
 LiveSession::LiveSession(const Config& config, const driver::SensorInfo& sensor, const std::string& metadata,
                          const LiveStart& start)
     : config_(config),
+      utime_source_(config.lcm.utime_source),
       description_(describe(sensor)),
       start_(start),
       socket_(udp_options(config.sensor, sensor)),
@@ -86,7 +87,7 @@ void LiveSession::publish(const PipelineFrame& frame) {
     if (!publisher_) return;
     host_time_.add(frame.header.stamp_ns, frame.header.receive_ns);
     report_clock_step();
-    const bool sensor_time = config_.lcm.utime_source == 1;
+    const bool sensor_time = utime_source_.load(std::memory_order_relaxed) == 1;
     const std::int64_t stamp_ns = sensor_time ? frame.header.stamp_ns : host_time_.next_stamp_ns(frame.header.stamp_ns);
     publisher_->publish(frame, stamp_ns / 1000);
 }
@@ -157,6 +158,7 @@ void LiveSession::judge_stream(const CounterList& counters, std::int64_t now_ns)
 
 void LiveSession::configure(const Config& config) {
     if (config.recording != config_.recording) recording_.configure(config.recording);
+    utime_source_.store(config.lcm.utime_source, std::memory_order_relaxed);
     config_ = config;
 }
 

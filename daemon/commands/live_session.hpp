@@ -1,6 +1,7 @@
 // One run on a live sensor: everything between its packets and the messages, and the reports on it.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -61,7 +62,8 @@ class LiveSession {
     void log_health(const status_t& status);
     void judge_stream(const CounterList& counters, std::int64_t now_ns);
 
-    Config config_;
+    Config config_;  ///< of the thread that reports: publishing has what it needs beside it
+    std::atomic<int> utime_source_;
     std::string description_;
     LiveStart start_;
     driver::UdpSource socket_;
