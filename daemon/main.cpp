@@ -6,6 +6,7 @@
 #include "daemon/commands/commands.hpp"
 #include "daemon/config/option.hpp"
 #include "daemon/output/output_file.hpp"
+#include "daemon/pipeline/huge_pages.hpp"
 #include "daemon/publish/lcm_bus.hpp"
 #include "driver/metadata.hpp"
 #include "driver/packet_source.hpp"
@@ -47,6 +48,7 @@ int fail(ExitCode code, const std::exception& error) {
 
 int main(int argc, char** argv) {
     using namespace dlod::daemon;
+    prefer_huge_pages();
     CLI::App app("Dynamic LiDAR odometry: pose, moving points and tracks from an Ouster lidar, over LCM.", "dlod");
     app.set_version_flag("--version", "dlod " DLOD_VERSION);
     app.require_subcommand(1);
