@@ -26,8 +26,8 @@ class DynamicLidarOdometry {
     void segment(Frame& frame);
     /// Two-stage registration. @param feedback of the frame kFeedbackDelay before, nullptr for the first ones
     void estimate_pose(Frame& frame, const OdometryFeedback* feedback);
-    // Without a valid pose nothing is detected and tracks are predicted only; with the handling of dynamic objects off
-    // there are none.
+    // Without a pose that follows the map nothing is detected and tracks are predicted only; with the handling of
+    // dynamic objects off there are none.
     void detect(Frame& frame);
     void track(Frame& frame);
     /// Labels every pixel and fills `feedback`.

@@ -155,7 +155,7 @@ void Detector::process(Frame& frame) {
     frame.detection.detections.clear();
     state.residuals.update(frame.odometry);
     if ((frame.odometry.flags & OdometryResult::kReinitialized) != 0) state.evidence.forget();
-    if (!frame.odometry.valid) return;
+    if (!frame.odometry.follows_map()) return;
     if (state.config.use_free_space) state.test(frame);
     state.detect(frame);
     state.complete(frame);

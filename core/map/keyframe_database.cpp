@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "core/map/keyframe_hulls.hpp"
@@ -13,6 +14,8 @@ constexpr std::size_t kAnchors = 5;
 // The first scans all become keyframes, so that the map does not rest on the noise of a single one.
 constexpr std::size_t kFirstKeyframes = 5;
 constexpr std::size_t kMaxAnnounced = 16;
+// Beyond this, 488 km, fixed point has no room.
+constexpr double kMaxFixed = 2e9;
 
 double angle_between(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
     return 2.0 * std::acos(std::min(1.0, std::abs(a.dot(b))));
@@ -77,7 +80,7 @@ void KeyframeDatabase::convert(const KeyframeCloud& cloud, std::vector<FixedPoin
         const Eigen::Vector3d p =
             cloud.T_world_sensor * Eigen::Vector3d(cloud.x[i], cloud.y[i], cloud.z[i]) / kMapUnit_m;
         const Eigen::Vector3d n = R * Eigen::Vector3d(cloud.nx[i], cloud.ny[i], cloud.nz[i]);
-        if (!(p.cwiseAbs().maxCoeff() < 2e9)) continue;
+        if (!(p.cwiseAbs().maxCoeff() < kMaxFixed)) continue;
         points.push_back({static_cast<std::int32_t>(std::lround(p.x())), static_cast<std::int32_t>(std::lround(p.y())),
                           static_cast<std::int32_t>(std::lround(p.z())), to_normal_units(n.x()), to_normal_units(n.y()),
                           to_normal_units(n.z())});
@@ -102,12 +105,44 @@ void KeyframeDatabase::add(const KeyframeCloud& cloud) {
     keyframe.rotation = Eigen::Quaterniond(cloud.T_world_sensor.rotation());
     keyframe.covariance = covariance;
     convert(cloud, keyframe.points);
-    keyframe.low_m.setConstant(1e12);
-    keyframe.high_m.setConstant(-1e12);
-    for (const FixedPoint& p : keyframe.points) {
-        const Eigen::Vector3d q = Eigen::Vector3d(p.x, p.y, p.z) * kMapUnit_m;
-        keyframe.low_m = keyframe.low_m.cwiseMin(q);
-        keyframe.high_m = keyframe.high_m.cwiseMax(q);
+    sort_by_place(keyframe.points);
+    find_bounds(keyframe);
+}
+
+/// Brings neighbours together, so that they share chunks and voxels.
+void KeyframeDatabase::sort_by_place(std::vector<FixedPoint>& points) {
+    constexpr int kPlaceBits = 13;  // two metres
+    constexpr std::uint64_t kMask = (std::uint64_t{1} << 20) - 1;
+    const auto part = [&](std::int32_t v) {
+        return static_cast<std::uint64_t>(static_cast<std::uint32_t>(v >> kPlaceBits)) & kMask;
+    };
+    places_.clear();
+    for (std::uint32_t i = 0; i < points.size(); ++i) {
+        const FixedPoint& p = points[i];
+        places_.emplace_back(part(p.x) << 40 | part(p.y) << 20 | part(p.z), i);
+    }
+    std::sort(places_.begin(), places_.end());
+    sorted_.clear();
+    for (const auto& [place, i] : places_) sorted_.push_back(points[i]);
+    points.assign(sorted_.begin(), sorted_.end());
+}
+
+void KeyframeDatabase::find_bounds(Keyframe& keyframe) {
+    keyframe.bounds.clear();
+    for (std::size_t first = 0; first < keyframe.points.size(); first += kChunk) {
+        const std::size_t last = std::min(first + kChunk, keyframe.points.size());
+        constexpr auto kHigh = std::numeric_limits<std::int32_t>::max();
+        constexpr auto kLow = std::numeric_limits<std::int32_t>::min();
+        Bounds b{{kHigh, kHigh, kHigh}, {kLow, kLow, kLow}};
+        for (std::size_t i = first; i < last; ++i) {
+            const FixedPoint& p = keyframe.points[i];
+            const std::int32_t at[3] = {p.x, p.y, p.z};
+            for (std::size_t k = 0; k < 3; ++k) {
+                b.low[k] = std::min(b.low[k], at[k]);
+                b.high[k] = std::max(b.high[k], at[k]);
+            }
+        }
+        keyframe.bounds.push_back(b);
     }
 }
 
@@ -136,14 +171,39 @@ void KeyframeDatabase::forget_farthest(const Eigen::Vector3d& position_m) {
 
 void KeyframeDatabase::remove_points(const OrientedBox& box) {
     const double reach = 0.5 * box.size_m.norm();
+    const Eigen::Array3d low = (box.center_m.array() - reach) / kMapUnit_m;
+    const Eigen::Array3d high = (box.center_m.array() + reach) / kMapUnit_m;
+    if (!((low.abs() < kMaxFixed).all() && (high.abs() < kMaxFixed).all())) return;
+    const Bounds around{
+        {static_cast<std::int32_t>(low[0]), static_cast<std::int32_t>(low[1]), static_cast<std::int32_t>(low[2])},
+        {static_cast<std::int32_t>(high[0]), static_cast<std::int32_t>(high[1]), static_cast<std::int32_t>(high[2])}};
     for (Keyframe& keyframe : keyframes_) {
-        const Eigen::Vector3d outside = (keyframe.low_m - box.center_m).cwiseMax(box.center_m - keyframe.high_m);
-        if (outside.maxCoeff() > reach) continue;
-        const auto first = std::stable_partition(
-            keyframe.points.begin(), keyframe.points.end(),
-            [&](const FixedPoint& p) { return !box.contains(Eigen::Vector3d(p.x, p.y, p.z) * kMapUnit_m); });
-        if (keyframe.in_submap) submap_.remove({first, keyframe.points.end()});
-        keyframe.points.erase(first, keyframe.points.end());
+        removed_.clear();
+        std::size_t kept = 0;
+        for (std::size_t chunk = 0; chunk < keyframe.bounds.size(); ++chunk) {
+            const Bounds& b = keyframe.bounds[chunk];
+            bool apart = false;
+            for (std::size_t k = 0; k < 3; ++k) apart |= b.high[k] < around.low[k] || b.low[k] > around.high[k];
+            const std::size_t first = chunk * kChunk;
+            const std::size_t last = std::min(first + kChunk, keyframe.points.size());
+            if (apart && kept == first) {
+                kept = last;
+                continue;
+            }
+            for (std::size_t i = first; i < last; ++i) {
+                const FixedPoint p = keyframe.points[i];
+                if (!apart && box.contains(Eigen::Vector3d(p.x, p.y, p.z) * kMapUnit_m)) {
+                    removed_.push_back(p);
+                } else {
+                    if (kept != i) keyframe.points[kept] = p;
+                    ++kept;
+                }
+            }
+        }
+        if (removed_.empty()) continue;
+        if (keyframe.in_submap) submap_.remove(removed_);
+        keyframe.points.resize(kept);
+        find_bounds(keyframe);
     }
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -74,18 +75,25 @@ class KeyframeDatabase {
     bool empty() const { return keyframes_.empty() && provisional_.empty(); }
 
   private:
+    /// Points that are looked over together: they lie near each other.
+    static constexpr std::size_t kChunk = 64;
+    struct Bounds {
+        std::array<std::int32_t, 3> low, high;  ///< inclusive, fixed point
+    };
     struct Keyframe {
         Eigen::Vector3d position_m;
         Eigen::Quaterniond rotation;
         std::vector<FixedPoint> points;
-        Eigen::Vector3d low_m, high_m;  ///< bounds of the points, world
-        Matrix6d covariance;            ///< of the pose, translation and rotation, world
+        std::vector<Bounds> bounds;  ///< of every kChunk points
+        Matrix6d covariance;         ///< of the pose, translation and rotation, world
         std::uint8_t on_convex_hull = 0;
         std::uint8_t on_concave_hull = 0;
         bool in_submap = false;
     };
 
     static void convert(const KeyframeCloud& cloud, std::vector<FixedPoint>& points);
+    void sort_by_place(std::vector<FixedPoint>& points);
+    static void find_bounds(Keyframe& keyframe);
     void forget_farthest(const Eigen::Vector3d& position_m);
     void update_hulls();
     void choose(std::size_t most, std::uint8_t Keyframe::*wanted);
@@ -100,9 +108,12 @@ class KeyframeDatabase {
     std::vector<Announced> announced_;
     std::vector<FixedPoint> provisional_;
     bool hulls_are_old_ = false;
-    std::vector<Eigen::Vector3d> positions_;             ///< scratch of update_hulls
-    std::vector<std::uint8_t> chosen_;                   ///< scratch of update_submap
-    std::vector<std::pair<double, std::size_t>> order_;  ///< scratch of update_submap
+    std::vector<Eigen::Vector3d> positions_;                       ///< scratch of update_hulls
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> places_;  ///< scratch of sort_by_place
+    std::vector<FixedPoint> sorted_;                               ///< scratch of sort_by_place
+    std::vector<FixedPoint> removed_;                              ///< scratch of remove_points
+    std::vector<std::uint8_t> chosen_;                             ///< scratch of update_submap
+    std::vector<std::pair<double, std::size_t>> order_;            ///< scratch of update_submap
 };
 
 }  // namespace dlod

@@ -6,11 +6,11 @@
 #include <pcl/point_types.h>
 #include <pcl/surface/concave_hull.h>
 #include <pcl/surface/convex_hull.h>
-#include <pcl/surface/impl/concave_hull.hpp>
-#include <pcl/surface/impl/convex_hull.hpp>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <pcl/surface/impl/concave_hull.hpp>
+#include <pcl/surface/impl/convex_hull.hpp>
 
 namespace dlod {
 namespace {

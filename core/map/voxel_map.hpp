@@ -203,7 +203,9 @@ void VoxelMap::for_each_around(VoxelIndex center, F&& f) {
                     const int bit = std::countr_zero(left);
                     const VoxelIndex index{bx * kSide + (bit & 3), by * kSide + ((bit >> 2) & 3),
                                            bz * kSide + (bit >> 4)};
-                    if (const VoxelPlane* plane = find(index)) f(index, *plane);
+                    const std::uint32_t slot = blocks_[block].slot[static_cast<std::size_t>(bit)];
+                    if (!fitted_[slot]) fit(slot);
+                    f(index, planes_[slot]);
                 }
             }
         }

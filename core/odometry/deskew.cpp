@@ -7,11 +7,14 @@
 namespace dlod {
 namespace {
 
+// Columns whose transforms stay in the first-level cache while all rows pass by.
+constexpr int kTile = 256;
+
 /// out = D * (x, y, z), 0 where nothing was returned; D varies with the column.
 DLOD_MULTIVERSION
-void deskew_run(const float* const* __restrict d, int first, const float* __restrict range, const float* __restrict x,
-                const float* __restrict y, const float* __restrict z, float* __restrict ox, float* __restrict oy,
-                float* __restrict oz, int count) {
+void deskew_run(const float* const* __restrict d, int first, const float* __restrict x, const float* __restrict y,
+                const float* __restrict z, float* __restrict ox, float* __restrict oy, float* __restrict oz,
+                int count) {
     const float* __restrict d0 = d[0] + first;
     const float* __restrict d1 = d[1] + first;
     const float* __restrict d2 = d[2] + first;
@@ -25,7 +28,7 @@ void deskew_run(const float* const* __restrict d, int first, const float* __rest
     const float* __restrict d10 = d[10] + first;
     const float* __restrict d11 = d[11] + first;
     for (int i = 0; i < count; ++i) {
-        const float there = range[i] > 0.0F ? 1.0F : 0.0F;
+        const float there = x[i] * x[i] + y[i] * y[i] + z[i] * z[i] > 0.0F ? 1.0F : 0.0F;
         ox[i] = d0[i] * x[i] + d1[i] * y[i] + d2[i] * z[i] + there * d3[i];
         oy[i] = d4[i] * x[i] + d5[i] * y[i] + d6[i] * z[i] + there * d7[i];
         oz[i] = d8[i] * x[i] + d9[i] * y[i] + d10[i] * z[i] + there * d11[i];
@@ -55,15 +58,20 @@ void deskew(const SensorModel& sensor, const SweepMotion& motion, Frame& frame) 
     }
     const float* rows[12];
     for (std::size_t k = 0; k < 12; ++k) rows[k] = out.deskew[k].data();
-    for (int r = 0; r < sensor.height; ++r) {
-        const int shift = ((sensor.pixel_shift[static_cast<std::size_t>(r)] % w) + w) % w;
-        const auto run = [&](int column, int measurement, int count) {
-            deskew_run(rows, measurement, frame.cloud.range_m.row(r) + column, frame.cloud.x.row(r) + column,
-                       frame.cloud.y.row(r) + column, frame.cloud.z.row(r) + column, out.x.row(r) + column,
-                       out.y.row(r) + column, out.z.row(r) + column, count);
-        };
-        run(0, w - shift, shift);
-        run(shift, 0, w - shift);
+    for (int first = 0; first < w; first += kTile) {
+        const int end = std::min(w, first + kTile);
+        for (int r = 0; r < sensor.height; ++r) {
+            const int shift = ((sensor.pixel_shift[static_cast<std::size_t>(r)] % w) + w) % w;
+            // The measurements [begin, past), whose columns follow each other up to the image's edge.
+            const auto run = [&](int begin, int past, int column) {
+                deskew_run(rows, begin, frame.cloud.x.row(r) + column, frame.cloud.y.row(r) + column,
+                           frame.cloud.z.row(r) + column, out.x.row(r) + column, out.y.row(r) + column,
+                           out.z.row(r) + column, past - begin);
+            };
+            const int edge = std::clamp(w - shift, first, end);
+            if (edge > first) run(first, edge, first + shift);
+            if (end > edge) run(edge, end, edge + shift - w);
+        }
     }
 }
 

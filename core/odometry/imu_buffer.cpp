@@ -7,6 +7,8 @@ namespace {
 
 constexpr float kMaxAngularVelocity_radps = 50.0F;
 constexpr float kMaxAcceleration_mps2 = 200.0F;
+// Samples older than the newest one by more than this come from a clock that has been set back.
+constexpr std::int64_t kClockStep_ns = 500'000'000;
 constexpr double kSpike_radps = 3.0;
 constexpr double kSpike_mps2 = 60.0;
 
@@ -28,7 +30,9 @@ std::int64_t ImuBuffer::oldest_ns() const {
 int ImuBuffer::add(std::span<const ImuSample> samples) {
     int taken = 0;
     for (const ImuSample& s : samples) {
-        if (!plausible(s) || (count_ > 0 && s.stamp_ns <= newest_ns())) continue;
+        if (!plausible(s)) continue;
+        if (count_ > 0 && s.stamp_ns < newest_ns() - kClockStep_ns) clear();
+        if (count_ > 0 && s.stamp_ns <= newest_ns()) continue;
         if (count_ == kCapacity) {
             first_ = (first_ + 1) % kCapacity;
             --count_;

@@ -11,7 +11,8 @@
 namespace dlod {
 
 /// Keeps the newest samples in time order. What is no number, out of order or beyond any sensor's range is left out,
-/// and so is a single sample that stands out from both its neighbours as no body can move.
+/// and so is a single sample that stands out from both its neighbours as no body can move. When the IMU's clock is set
+/// back it begins anew.
 class ImuBuffer {
   public:
     struct Reading {

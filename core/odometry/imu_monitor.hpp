@@ -10,8 +10,9 @@
 
 namespace dlod {
 
-/// Watches the samples (silent, stuck, spikes, no numbers) and how they agree with the lidar (wrong axes, wrong scale).
-/// A fault takes effect at once; the IMU is taken back after it has behaved for a while, twice as long each time.
+/// Watches the samples (silent, on another clock, stuck, spikes, no numbers) and how they agree with the lidar (wrong
+/// axes, wrong scale). A fault takes effect at once; the IMU is taken back after it has behaved for a while, twice as
+/// long each time.
 class ImuMonitor {
   public:
     /// The samples that came with a frame.
@@ -29,13 +30,18 @@ class ImuMonitor {
 
     bool usable() const { return present_ && !faulty_; }
     bool faulty() const { return faulty_; }
+    /// The last frame's samples show no motion: neither turn nor shock nor vibration.
+    bool quiet() const { return quiet_frames_ > 0; }
 
   private:
     void fail();
+    void see_rest(std::span<const ImuSample> samples);
 
     bool present_ = false;  ///< there has been a sample, ever
     bool faulty_ = false;
-    bool clean_ = true;  ///< nothing wrong with the last frame's samples
+    int quiet_frames_ = 0;                                       ///< in a row
+    Eigen::Vector3f rest_force_mps2_ = Eigen::Vector3f::Zero();  ///< mean over them
+    bool clean_ = true;                                          ///< nothing wrong with the last frame's samples
     int clean_frames_ = 0;
     int wait_frames_ = 10;       ///< doubled by each fault
     double disagreement_ = 0.0;  ///< of lidar and IMU, a leaky sum

@@ -19,6 +19,9 @@ constexpr double kPredictionStep_s = 2.5e-3;
 constexpr double kCovarianceStep_s = 0.1;
 // Variance of a block that the present mode does not know: so small that it stays what it is.
 constexpr double kFrozen = 1e-12;
+// A body at rest: how well its velocity is zero, and beyond how many standard deviations it is not believed to be.
+constexpr double kRest_mps = 0.03;
+constexpr double kRestDeviations = 3.0;
 
 std::int64_t nanoseconds(double seconds) {
     return std::llround(seconds * 1e9);
@@ -175,9 +178,9 @@ void MotionFilter::begin_update() {
     information_ = prior_information_;
 }
 
-MotionFilter::Step MotionFilter::step(const NormalEquations& equations) {
+MotionFilter::Step MotionFilter::step(const NormalEquations& equations, const Observability::Directions& held) {
     // The points' h is about (position, rotation) at their own time; dt turns it into (velocity, rate) at the stamp.
-    const double share = config_.information_share;
+    const double share = imu_ != nullptr ? config_.information_share : config_.information_share_without_imu;
     Matrix6d G = Matrix6d::Identity();
     G.block<3, 3>(3, 3) = (imu_ != nullptr ? -1.0 : 1.0) * state_.rotation.toRotationMatrix();
     information_ = prior_information_;
@@ -186,16 +189,46 @@ MotionFilter::Step MotionFilter::step(const NormalEquations& equations) {
     information_.block<6, 6>(0, 6) += cross;
     information_.block<6, 6>(6, 0) += cross.transpose();
     information_.block<6, 6>(6, 6) += share * G.transpose() * equations.A[2] * G;
-    Vector gradient = prior_information_ * difference(state_, prior_);
+    const Vector change = difference(state_, prior_);
+    Vector gradient = prior_information_ * change;
     gradient.segment<6>(0) += share * equations.b[0];
     gradient.segment<6>(6) += share * G.transpose() * equations.b[1];
-    const Vector error = information_.ldlt().solve(-gradient);
+    // What is held goes back to the prediction; the rest is solved for given that.
+    held_.setZero(kStates, 2 * held.cols());
+    held_.topLeftCorner(6, held.cols()) = held;
+    held_.block(6, held.cols(), 6, held.cols()) = G.transpose() * held;
+    Vector error = -held_ * (held_.transpose() * change);
+    if (held.cols() > 0) {
+        const Matrix free = Matrix::Identity() - held_ * held_.transpose();
+        gradient = (free * (gradient + information_ * error)).eval();
+        information_ = (free * information_ * free + held_ * held_.transpose()).eval();
+    }
+    error += information_.ldlt().solve(-gradient);
     apply(state_, error);
     return {error.segment<3>(kPosition).norm(), error.segment<3>(kRotation).norm()};
 }
 
 void MotionFilter::finish_update() {
+    const Matrix prior = covariance_;
     covariance_ = information_.ldlt().solve(Matrix::Identity());
+    if (held_.cols() > 0) {
+        // What is held keeps its uncertainty, and the rest depends on it as the prediction says (a consider filter).
+        const Matrix free = Matrix::Identity() - held_ * held_.transpose();
+        const auto effect = (held_ - covariance_ * free * prior_information_ * held_).eval();
+        covariance_ -= held_ * held_.transpose();
+        covariance_ += effect * (held_.transpose() * prior * held_) * effect.transpose();
+    }
+    covariance_ = 0.5 * (covariance_ + covariance_.transpose()).eval();
+}
+
+void MotionFilter::observe_rest(const Eigen::Vector3d& direction) {
+    const double velocity = direction.dot(state_.velocity_mps);
+    const Vector column = covariance_.middleCols<3>(kVelocity) * direction;
+    const double variance = direction.dot(column.segment<3>(kVelocity));
+    if (velocity * velocity > kRestDeviations * kRestDeviations * variance) return;
+    const Vector gain = column / (variance + kRest_mps * kRest_mps);
+    apply(state_, -velocity * gain);
+    covariance_ -= gain * column.transpose();
     covariance_ = 0.5 * (covariance_ + covariance_.transpose()).eval();
 }
 

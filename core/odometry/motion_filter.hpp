@@ -11,6 +11,7 @@
 
 #include "core/odometry/imu_buffer.hpp"
 #include "core/registration/normal_equations.hpp"
+#include "core/registration/observability.hpp"
 #include "core/registration/sweep_motion.hpp"
 #include "core/types/lie.hpp"
 #include "core/types/parameter.hpp"
@@ -19,12 +20,13 @@ namespace dlod {
 
 struct MotionFilterConfig {
     double gyro_noise = 1e-3;
-    double accelerometer_noise = 0.05;
+    double accelerometer_noise = 0.02;
     double gyro_bias_walk = 1e-4;
     double accelerometer_bias_walk = 2e-3;
-    double acceleration = 0.3;
-    double angular_acceleration = 0.3;
-    double information_share = 0.01;
+    double acceleration = 1.0;
+    double angular_acceleration = 1.0;
+    double information_share = 0.05;
+    double information_share_without_imu = 0.01;
 
     template <class V>
     void visit(V& v) {
@@ -42,6 +44,8 @@ struct MotionFilterConfig {
                     "without IMU: white angular acceleration");
         v.parameter("information_share", information_share, Range{1e-4, 1.0}, "",
                     "share of the points whose errors are independent; lower trusts the lidar less");
+        v.parameter("information_share_without_imu", information_share_without_imu, Range{1e-4, 1.0}, "",
+                    "the same without IMU; lower takes the motion to be smoother");
     }
 };
 
@@ -83,8 +87,12 @@ class MotionFilter {
         double translation_m = 0.0;
         double rotation_rad = 0.0;
     };
-    Step step(const NormalEquations& equations);
+    /// @param held directions of (translation, rotation), world axes, along which the lidar says nothing: pose and
+    /// velocity stay as predicted there, and so does their uncertainty
+    Step step(const NormalEquations& equations, const Observability::Directions& held);
     void finish_update();
+    /// After an update: the velocity along this direction, world axes, is believed to be zero, as far as it can be.
+    void observe_rest(const Eigen::Vector3d& direction);
     /// Back to the prediction.
     void discard_update() { state_ = prior_; }
     /// What the update has changed against the prediction, and the prediction's standard deviations.
@@ -119,6 +127,7 @@ class MotionFilter {
     Matrix covariance_ = Matrix::Identity();
     Matrix prior_information_ = Matrix::Identity();
     Matrix information_ = Matrix::Identity();
+    Eigen::Matrix<double, kStates, Eigen::Dynamic, 0, kStates, 12> held_;  ///< of the last step: basis of what is held
     std::int64_t stamp_ns_ = 0;
 };
 

@@ -38,7 +38,7 @@ void MovingPoints::mark(const PlacedPoints& placed, const Eigen::Vector3d& origi
         local[b].cosine = static_cast<float>(std::cos(box.yaw_rad));
         local[b].sine = static_cast<float>(std::sin(box.yaw_rad));
     }
-    for (std::size_t i = 0; i < placed.size(); ++i) {
+    for (std::size_t i = 0; i < excluded.size(); ++i) {
         for (std::size_t b = 0; b < boxes_.size(); ++b) {
             const Local& box = local[b];
             const float dx = placed.x[i] - box.center[0];

@@ -15,6 +15,7 @@ namespace dlod {
 
 struct OdometryConfig {
     bool use_imu = true;
+    double max_deviation_m = 0.3;
     ScanToScanConfig scan_to_scan;
     ScanToSubmapConfig scan_to_submap;
     MotionFilterConfig motion;
@@ -24,6 +25,9 @@ struct OdometryConfig {
     template <class V>
     void visit(V& v) {
         v.flag("use_imu", use_imu, "use the sensor's IMU for rotation, gravity and motion within the sweep");
+        v.parameter("max_deviation_m", max_deviation_m, Range{0.01, 100.0}, "m",
+                    "a pose is valid while its standard deviation against the local map stays below this in every "
+                    "direction; higher trusts predictions for longer, in tunnels and through gaps");
         v.group("scan_to_scan", scan_to_scan, "first stage of the registration");
         v.group("scan_to_submap", scan_to_submap, "second stage of the registration");
         v.group("motion", motion, "motion model and its noise");

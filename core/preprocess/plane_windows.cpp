@@ -18,50 +18,39 @@ void invert_ranges(const std::uint32_t* __restrict range_mm, float* __restrict i
     }
 }
 
-/// Sums over the pixels of all windows of a row; pixels[k][i] is pixel k of window i.
+/// Eight windows side by side, in registers.
+constexpr int kLanes = 8;
+using Lanes = float __attribute__((vector_size(kLanes * sizeof(float)), aligned(alignof(float)), may_alias));
+
+/// Fits the windows of a row, `count` rounded up to whole lanes; pixels[k][i] is pixel k of window i.
 DLOD_MULTIVERSION
 void fit_windows(const float* const* __restrict pixels, const float (*__restrict weight)[kWindowPixels],
                  const float* __restrict scale, const float* __restrict azimuth, const float* __restrict altitude,
                  int count, float* __restrict inverse, float* __restrict slope_azimuth,
                  float* __restrict slope_altitude, float* __restrict deviation) {
-    constexpr int kBlock = 64;
-    float a[kBlock], b[kBlock], g[kBlock], low[kBlock], squares[kBlock];
-    for (int start = 0; start < count; start += kBlock) {
-        const int n = std::min(kBlock, count - start);
-        for (int c = 0; c < kBlock; ++c) {
-            a[c] = b[c] = g[c] = squares[c] = 0.0F;
-            low[c] = 1e9F;
+    for (int start = 0; start < count; start += kLanes) {
+        Lanes a{}, b{}, g{}, squares{};
+        Lanes low = *reinterpret_cast<const Lanes*>(pixels[0] + start);
+        for (int k = 0; k < kWindowPixels; ++k) {
+            const Lanes f = *reinterpret_cast<const Lanes*>(pixels[k] + start);
+            a += weight[0][k] * f;
+            b += weight[1][k] * f;
+            g += weight[2][k] * f;
+            low = low < f ? low : f;
         }
         for (int k = 0; k < kWindowPixels; ++k) {
-            const float* __restrict f = pixels[k] + start;
-            const float wa = weight[0][k];
-            const float wb = weight[1][k];
-            const float wg = weight[2][k];
-            for (int c = 0; c < n; ++c) {
-                a[c] += wa * f[c];
-                b[c] += wb * f[c];
-                g[c] += wg * f[c];
-                low[c] = low[c] < f[c] ? low[c] : f[c];
-            }
+            const Lanes f = *reinterpret_cast<const Lanes*>(pixels[k] + start);
+            const Lanes e = f * scale[k] - (a + azimuth[k] * b + altitude[k] * g);
+            squares += e * e;
         }
-        for (int k = 0; k < kWindowPixels; ++k) {
-            const float* __restrict f = pixels[k] + start;
-            const float s = scale[k];
-            const float u = azimuth[k];
-            const float v = altitude[k];
-            for (int c = 0; c < n; ++c) {
-                const float e = f[c] * s - (a[c] + u * b[c] + v * g[c]);
-                squares[c] += e * e;
-            }
-        }
-        for (int c = 0; c < n; ++c) {
-            const bool whole = low[c] > 0.0F && a[c] > 1e-4F;
-            inverse[start + c] = whole ? a[c] : 0.0F;
-            slope_azimuth[start + c] = b[c];
-            slope_altitude[start + c] = g[c];
+        *reinterpret_cast<Lanes*>(slope_azimuth + start) = b;
+        *reinterpret_cast<Lanes*>(slope_altitude + start) = g;
+        for (int l = 0; l < kLanes; ++l) {
+            const bool whole = low[l] > 0.0F && a[l] > 1e-4F;
+            inverse[start + l] = whole ? a[l] : 0.0F;
             // d(range) = d(inverse) / inverse^2
-            deviation[start + c] =
-                whole ? std::sqrt(squares[c] * (1.0F / static_cast<float>(kWindowPixels))) / (a[c] * a[c]) : 0.0F;
+            deviation[start + l] =
+                whole ? std::sqrt(squares[l] * (1.0F / static_cast<float>(kWindowPixels))) / (a[l] * a[l]) : 0.0F;
         }
     }
 }
@@ -77,7 +66,8 @@ PlaneWindows::PlaneWindows(const SensorModel& sensor, int column_step)
     const int w = sensor.width;
     const double per_column = 2.0 * std::numbers::pi / w;
     // One value before the image and two after it at most: a window reaches kWindowRadius columns to either side.
-    stride_ = static_cast<std::size_t>(windows_ + 2 * kWindowRadius);
+    // Windows are read by whole lanes.
+    stride_ = static_cast<std::size_t>(windows_ + 2 * kWindowRadius + kLanes);
     inverse_.assign(static_cast<std::size_t>(h) * static_cast<std::size_t>(column_step) * stride_, 0.0F);
     row_.resize(static_cast<std::size_t>(w));
     for (int m = 0; m < w; ++m) {
@@ -157,7 +147,7 @@ void PlaneWindows::load(const Frame& frame) {
 void PlaneWindows::fit_row(int row, PlaneRow& planes) const {
     const auto count = static_cast<std::size_t>(windows_);
     for (auto* values : {&planes.inverse_range, &planes.slope_azimuth, &planes.slope_altitude, &planes.deviation_m}) {
-        values->resize(count);
+        values->resize(count + kLanes);
     }
     const RowModel& model = model_[static_cast<std::size_t>(row)];
     const float* pixels[kWindowPixels];
@@ -176,9 +166,9 @@ void PlaneWindows::fit_row(int row, PlaneRow& planes) const {
     }
 }
 
-BeamFrame PlaneWindows::beam(int row, int column) const {
+BeamFrame PlaneWindows::beam(int row, int measurement) const {
     const auto r = static_cast<std::size_t>(row);
-    const auto m = static_cast<std::size_t>(sensor_.measurement_of(row, column));
+    const auto m = static_cast<std::size_t>(measurement);
     const RowModel& model = model_[r];
     const float c = cos_azimuth_[m] * model.cos_offset - sin_azimuth_[m] * model.sin_offset;
     const float s = sin_azimuth_[m] * model.cos_offset + cos_azimuth_[m] * model.sin_offset;

@@ -44,7 +44,8 @@ class PlaneWindows {
     float distance(std::uint32_t range_mm) const {
         return static_cast<float>(range_mm) * 1e-3F - sensor_.beam_origin_m;
     }
-    BeamFrame beam(int row, int column) const;
+    /// @param measurement column in which the pixel was fired
+    BeamFrame beam(int row, int measurement) const;
 
   private:
     /// Weights of a window's pixels in inverse range and its two slopes, and the tangent-plane coordinates.

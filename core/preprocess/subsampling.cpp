@@ -71,8 +71,11 @@ void Subsampling::collect_row(const Frame& frame, int row) {
     const float* y = frame.cloud.y.row(row);
     const float* z = frame.cloud.z.row(row);
     const int first = row * w;
+    int measurement = sensor_.measurement_of(row, 0) - config_.column_step;
     for (int k = 0; k < windows_.windows(); ++k) {
         const int c = k * config_.column_step;
+        measurement += config_.column_step;
+        if (measurement >= w) measurement -= w;
         if (range[c] < min_range) continue;
         if (std::max({std::abs(x[c]), std::abs(y[c]), std::abs(z[c])}) < crop) continue;
         const auto i = static_cast<std::size_t>(k);
@@ -86,82 +89,102 @@ void Subsampling::collect_row(const Frame& frame, int row) {
             const float g = planes_.slope_altitude[i];
             const float length = std::sqrt(inverse * inverse + b * b + g * g);
             if (inverse >= min_incidence * length) {
-                const BeamFrame beam = windows_.beam(row, c);
+                const BeamFrame beam = windows_.beam(row, measurement);
                 const Eigen::Vector3f normal = -(inverse * beam.direction + b * beam.along_row + g * beam.up) / length;
                 const float ratio = planes_.deviation_m[i] / max_deviation;
-                flat_.push_back({static_cast<PixelIndex>(first + c), direction_bin(normal),
-                                 1.0F / inverse - windows_.distance(raw[c]), 1.0F - 0.9F * ratio * ratio, normal.x(),
-                                 normal.y(), normal.z()});
+                const float smoothing = 1.0F / inverse - windows_.distance(raw[c]);
+                flat_.push_back({static_cast<PixelIndex>(first + c), static_cast<std::uint16_t>(measurement),
+                                 direction_bin(normal), 1.0F - 0.9F * ratio * ratio,
+                                 x[c] + smoothing * beam.direction.x(), y[c] + smoothing * beam.direction.y(),
+                                 z[c] + smoothing * beam.direction.z(), normal.x(), normal.y(), normal.z()});
                 continue;
             }
         }
-        if (k % config_.rough_step == 0) rough_.push_back(static_cast<PixelIndex>(first + c));
+        if (k % config_.rough_step == 0) {
+            rough_.push_back({static_cast<PixelIndex>(first + c), static_cast<std::uint16_t>(measurement)});
+        }
     }
 }
 
-int Subsampling::measurement_of(PixelIndex pixel) const {
-    return sensor_.measurement_of(static_cast<int>(pixel) / sensor_.width, static_cast<int>(pixel) % sensor_.width);
-}
-
-/// Counting sort of 0 .. count - 1 into order_.
-template <class Measurement>
-void Subsampling::sort_by_measurement(std::size_t count, Measurement&& measurement) {
+/// Counting sort of the candidates' numbers into order_.
+template <class Candidate>
+void Subsampling::sort_by_measurement(const std::vector<Candidate>& candidates) {
     next_.assign(static_cast<std::size_t>(sensor_.width) + 1, 0);
-    for (std::size_t i = 0; i < count; ++i) ++next_[static_cast<std::size_t>(measurement(i)) + 1];
+    for (const Candidate& c : candidates) ++next_[std::size_t{c.measurement} + 1];
     for (std::size_t m = 1; m < next_.size(); ++m) next_[m] += next_[m - 1];
-    order_.resize(count);
-    for (std::size_t i = 0; i < count; ++i)
-        order_[next_[static_cast<std::size_t>(measurement(i))]++] = static_cast<std::uint32_t>(i);
+    order_.resize(candidates.size());
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+        order_[next_[candidates[i].measurement]++] = static_cast<std::uint32_t>(i);
+    }
 }
 
-void Subsampling::select(Frame& frame) {
-    PointSelection& points = frame.prepared.points;
-    points.clear();
-    const auto append = [&](PixelIndex pixel, const Eigen::Vector3f& normal, float planarity, float smoothing_m) {
-        const auto m = static_cast<std::size_t>(measurement_of(pixel));
-        Eigen::Vector3f p(frame.cloud.x[pixel], frame.cloud.y[pixel], frame.cloud.z[pixel]);
-        if (smoothing_m != 0.0F)
-            p += smoothing_m *
-                 windows_.beam(static_cast<int>(pixel) / sensor_.width, static_cast<int>(pixel) % sensor_.width)
-                     .direction;
-        points.pixel.push_back(pixel);
-        points.measurement.push_back(static_cast<std::uint16_t>(m));
-        points.x.push_back(p.x());
-        points.y.push_back(p.y());
-        points.z.push_back(p.z());
-        points.nx.push_back(normal.x());
-        points.ny.push_back(normal.y());
-        points.nz.push_back(normal.z());
-        points.planarity.push_back(planarity);
-        points.time_s.push_back(static_cast<float>(frame.columns.time_ns[m] - frame.header.stamp_ns) * 1e-9F);
-    };
+/// Leaves the flat candidates that are kept: every count/share-th of a bin, spread evenly over the image.
+void Subsampling::thin_out() {
     std::array<int, kDirections> count{};
-    for (const Candidate& candidate : flat_) ++count[candidate.direction];
+    for (const Flat& candidate : flat_) ++count[candidate.direction];
     const int share = fair_share(count, config_.points);
-    // Every count/share-th of a bin, spread evenly over the image.
     std::array<int, kDirections> credit{};
-    std::erase_if(flat_, [&](const Candidate& candidate) {
+    std::erase_if(flat_, [&](const Flat& candidate) {
         int& c = credit[candidate.direction];
         c += std::min(share, count[candidate.direction]);
         if (c < count[candidate.direction]) return true;
         c -= count[candidate.direction];
         return false;
     });
-    // In the order of their firing, so that neighbours share their place in the sweep.
-    sort_by_measurement(flat_.size(), [&](std::size_t i) { return measurement_of(flat_[i].pixel); });
-    for (const std::uint32_t i : order_) {
-        const Candidate& c = flat_[i];
-        append(c.pixel, {c.nx, c.ny, c.nz}, c.planarity, c.smoothing_m);
+}
+
+void Subsampling::select(Frame& frame) {
+    thin_out();
+    PointSelection& points = frame.prepared.points;
+    const std::size_t total = flat_.size() + rough_.size();
+    // Room for all candidates once and for all: a frame that has more of them than those before must not allocate.
+    points.pixel.reserve(flat_.capacity());
+    points.measurement.reserve(flat_.capacity());
+    points.pixel.resize(total);
+    points.measurement.resize(total);
+    for (auto* values :
+         {&points.x, &points.y, &points.z, &points.nx, &points.ny, &points.nz, &points.planarity, &points.time_s}) {
+        values->reserve(flat_.capacity());
+        values->resize(total);
     }
-    sort_by_measurement(rough_.size(), [&](std::size_t i) { return measurement_of(rough_[i]); });
+    const auto time_of = [&](std::uint16_t measurement) {
+        return static_cast<float>(frame.columns.time_ns[measurement] - frame.header.stamp_ns) * 1e-9F;
+    };
+    // In the order of their firing, so that neighbours share their place in the sweep.
+    sort_by_measurement(flat_);
+    std::size_t at = 0;
+    for (const std::uint32_t i : order_) {
+        const Flat& c = flat_[i];
+        points.pixel[at] = c.pixel;
+        points.measurement[at] = c.measurement;
+        points.x[at] = c.x;
+        points.y[at] = c.y;
+        points.z[at] = c.z;
+        points.nx[at] = c.nx;
+        points.ny[at] = c.ny;
+        points.nz[at] = c.nz;
+        points.planarity[at] = c.planarity;
+        points.time_s[at] = time_of(c.measurement);
+        ++at;
+    }
+    sort_by_measurement(rough_);
     const int available = static_cast<int>(rough_.size());
     const int wanted = std::clamp(config_.least_points - static_cast<int>(flat_.size()), 0, available);
-    int raw_credit = 0;
+    int credit = 0;
     for (const std::uint32_t i : order_) {
-        raw_credit += wanted;
-        const bool takes_part = raw_credit >= available && wanted > 0;
-        if (takes_part) raw_credit -= available;
-        append(rough_[i], Eigen::Vector3f::Zero(), takes_part ? kRawPlanarity : 0.0F, 0.0F);
+        const Rough& c = rough_[i];
+        credit += wanted;
+        const bool takes_part = credit >= available && wanted > 0;
+        if (takes_part) credit -= available;
+        points.pixel[at] = c.pixel;
+        points.measurement[at] = c.measurement;
+        points.x[at] = frame.cloud.x[c.pixel];
+        points.y[at] = frame.cloud.y[c.pixel];
+        points.z[at] = frame.cloud.z[c.pixel];
+        points.nx[at] = points.ny[at] = points.nz[at] = 0.0F;
+        points.planarity[at] = takes_part ? kRawPlanarity : 0.0F;
+        points.time_s[at] = time_of(c.measurement);
+        ++at;
     }
 }
 

@@ -9,7 +9,7 @@
 namespace dlod {
 
 struct SubsamplingConfig {
-    int rows = 43;
+    int rows = 32;
     int column_step = 4;
     int rough_step = 1;
     int points = 3000;
@@ -55,26 +55,31 @@ class Subsampling {
   private:
     static constexpr int kDirections = 24;  ///< bins of normals: 2 x 2 on each face of a cube
 
-    struct Candidate {
+    struct Rough {
         PixelIndex pixel;
-        std::uint8_t direction;
-        float smoothing_m;  ///< to be added along the beam
+        std::uint16_t measurement;
+    };
+    struct Flat {
+        PixelIndex pixel;
+        std::uint16_t measurement;
+        std::uint8_t direction;  ///< bin of the normal
         float planarity;
+        float x, y, z;  ///< smoothed along the beam
         float nx, ny, nz;
     };
 
     void collect_row(const Frame& frame, int row);
+    void thin_out();
     void select(Frame& frame);
-    int measurement_of(PixelIndex pixel) const;
-    template <class Measurement>
-    void sort_by_measurement(std::size_t count, Measurement&& measurement);
+    template <class Candidate>
+    void sort_by_measurement(const std::vector<Candidate>& candidates);
 
     SensorModel sensor_;
     SubsamplingConfig config_;
     PlaneWindows windows_;
     PlaneRow planes_;
-    std::vector<Candidate> flat_;
-    std::vector<PixelIndex> rough_;
+    std::vector<Flat> flat_;
+    std::vector<Rough> rough_;
     std::vector<int> candidate_rows_;
     std::vector<std::uint32_t> order_;  ///< scratch of sort_by_measurement
     std::vector<std::uint32_t> next_;   ///< scratch of sort_by_measurement

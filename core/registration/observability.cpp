@@ -17,43 +17,52 @@ constexpr float kFacingLever = 0.1F;
 constexpr double kFacingMatches = 15.0;
 constexpr double kFacingPerMille = 5.0;
 
-/// Number of matches that face the direction.
-double facing_matches(const PlaneMatches& matches, int block, const Eigen::Vector3f& u) {
-    double facing = 0.0;
-    for (std::size_t i = 0; i < matches.count; ++i) {
-        const auto b = static_cast<std::size_t>(block);
-        const float along =
-            std::abs(matches.h[b][i] * u.x() + matches.h[b + 1][i] * u.y() + matches.h[b + 2][i] * u.z());
-        if (along > (block == 0 ? kFacingCosine : kFacingLever * matches.lever_m[i])) facing += 1.0;
-    }
-    return facing;
+/// The part of a match along a direction.
+float part_along(const PlaneMatches& matches, std::size_t i, int block, const Eigen::Vector3f& u) {
+    const auto b = static_cast<std::size_t>(block);
+    return matches.h[b][i] * u.x() + matches.h[b + 1][i] * u.y() + matches.h[b + 2][i] * u.z();
+}
+
+bool faces(const PlaneMatches& matches, std::size_t i, int block, float along) {
+    return std::abs(along) > (block == 0 ? kFacingCosine : kFacingLever * matches.lever_m[i]);
 }
 
 }  // namespace
 
-Observability observe(const PlaneMatches& matches, const NormalEquations& equations) {
+Observability Observability::of(const PlaneMatches& matches, const NormalEquations& equations, double demand) {
     Observability result;
-    const double least = std::max(kFacingMatches, 1e-3 * kFacingPerMille * static_cast<double>(matches.count));
+    const double least = demand * std::max(kFacingMatches, 1e-3 * kFacingPerMille * static_cast<double>(matches.count));
     for (const int block : {0, 3}) {
         Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
         const Eigen::Matrix3d information = equations.A[0].block<3, 3>(block, block);
         solver.computeDirect(information);
         for (int k = 0; k < 3; ++k) {
             if (solver.eigenvalues()[k] > kClearShare * solver.eigenvalues()[2]) break;
-            const Eigen::Vector3d u = solver.eigenvectors().col(k);
-            if (facing_matches(matches, block, u.cast<float>()) >= least) continue;
-            result.projector.block<3, 3>(block, block) -= u * u.transpose();
-            ++result.unobservable;
+            const Eigen::Vector3f u = solver.eigenvectors().col(k).cast<float>();
+            double facing = 0.0;
+            for (std::size_t i = 0; i < matches.count; ++i) {
+                facing += faces(matches, i, block, part_along(matches, i, block, u)) ? 1.0 : 0.0;
+            }
+            if (facing >= least) {
+                result.weak_[static_cast<std::size_t>(result.weak_count_++)] = {u, block};
+            } else {
+                result.directions_.block<3, 1>(block, result.unobservable_++) = solver.eigenvectors().col(k);
+            }
         }
     }
     return result;
 }
 
-void project(const Observability& observability, NormalEquations& equations) {
-    if (observability.unobservable == 0) return;
-    const Matrix6d& P = observability.projector;
-    for (Matrix6d& A : equations.A) A = (P * A * P).eval();
-    for (Vector6d& b : equations.b) b = (P * b).eval();
+void Observability::leave_facing(PlaneMatches& matches) const {
+    for (int k = 0; k < weak_count_; ++k) {
+        const auto& [u, block] = weak_[static_cast<std::size_t>(k)];
+        const auto b = static_cast<std::size_t>(block);
+        for (std::size_t i = 0; i < matches.count; ++i) {
+            const float along = part_along(matches, i, block, u);
+            if (faces(matches, i, block, along)) continue;
+            for (std::size_t j = 0; j < 3; ++j) matches.h[b + j][i] -= along * u[static_cast<Eigen::Index>(j)];
+        }
+    }
 }
 
 }  // namespace dlod

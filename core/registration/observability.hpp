@@ -8,15 +8,33 @@
 
 namespace dlod {
 
-struct Observability {
-    Matrix6d projector = Matrix6d::Identity();  ///< onto the observable directions of (translation, rotation)
-    int unobservable = 0;                       ///< number of directions that are not
+/// Principal directions of translation and of rotation, world axes, about which the matches say little.
+class Observability {
+  public:
+    using Directions = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 6>;
+
+    /// Looks at matches and what they sum up to.
+    /// @param demand how many times the usual number of facing matches makes a direction observable
+    static Observability of(const PlaneMatches& matches, const NormalEquations& equations, double demand = 1.0);
+
+    /// Directions that next to no match faces: number of columns.
+    int unobservable() const { return unobservable_; }
+    /// Unit vectors of (translation, rotation), of which one part is zero: there the prediction must hold.
+    Directions directions() const { return directions_.leftCols(unobservable_); }
+
+    /// Along directions that only few matches face, the noise of all the others' normals outweighs what those few say:
+    /// takes it out.
+    void leave_facing(PlaneMatches& matches) const;
+
+  private:
+    struct Weak {
+        Eigen::Vector3f direction;
+        int block;  ///< first row in (translation, rotation)
+    };
+    Matrix6d directions_ = Matrix6d::Zero();
+    int unobservable_ = 0;
+    std::array<Weak, 6> weak_;  ///< observable, but by few
+    int weak_count_ = 0;
 };
-
-/// Looks at the principal directions of translation and of rotation.
-Observability observe(const PlaneMatches& matches, const NormalEquations& equations);
-
-/// Removes what the matches seem to say about unobservable directions: there the prediction holds.
-void project(const Observability& observability, NormalEquations& equations);
 
 }  // namespace dlod

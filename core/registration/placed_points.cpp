@@ -47,11 +47,11 @@ void place_run(const float* __restrict first, const float* __restrict change, fl
 
 }  // namespace
 
-void place(const PointSelection& points, const SweepMotion& motion, PlacedPoints& placed) {
-    const std::size_t count = points.size();
+void place(const PointSelection& points, std::size_t count, const SweepMotion& motion, PlacedPoints& placed) {
     for (auto* v :
          {&placed.x, &placed.y, &placed.z, &placed.lx, &placed.ly, &placed.lz, &placed.nx, &placed.ny, &placed.nz}) {
-        v->resize(count);
+        v->reserve(points.pixel.capacity());
+        v->resize(points.size());
     }
     const Arrays arrays{points.time_s.data(), points.x.data(),  points.y.data(),  points.z.data(),
                         points.nx.data(),     points.ny.data(), points.nz.data(), placed.x.data(),

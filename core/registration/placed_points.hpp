@@ -15,7 +15,13 @@ struct PlacedPoints {
     std::size_t size() const { return x.size(); }
 };
 
-/// Moves all points. Fast when neighbours in the selection were fired at similar times.
-void place(const PointSelection& points, const SweepMotion& motion, PlacedPoints& placed);
+/// Moves the first `count` points; the others' values are undefined. Fast when neighbours in the selection were fired
+/// at similar times.
+void place(const PointSelection& points, std::size_t count, const SweepMotion& motion, PlacedPoints& placed);
+
+/// Moves all points.
+inline void place(const PointSelection& points, const SweepMotion& motion, PlacedPoints& placed) {
+    place(points, points.size(), motion, placed);
+}
 
 }  // namespace dlod

@@ -38,7 +38,8 @@ int ScanToScan::cell_of(const float p[3]) {
 void ScanToScan::set_target(const PointSelection& points, std::span<const std::uint8_t> excluded,
                             const PlacedPoints& placed, const Eigen::Isometry3f& T_sensor_local) {
     for (Surfel& surfel : grid_) surfel.set = false;
-    for (std::size_t i = 0; i < points.size(); ++i) {
+    const std::size_t count = excluded.empty() ? points.size() : excluded.size();
+    for (std::size_t i = 0; i < count; ++i) {
         if (points.planarity[i] <= 0.0F || (!excluded.empty() && excluded[i])) continue;
         const Eigen::Vector3f p = T_sensor_local * Eigen::Vector3f(placed.x[i], placed.y[i], placed.z[i]);
         const Eigen::Vector3f n = T_sensor_local.linear() * Eigen::Vector3f(placed.nx[i], placed.ny[i], placed.nz[i]);
@@ -53,14 +54,14 @@ void ScanToScan::set_target(const PointSelection& points, std::span<const std::u
 
 void ScanToScan::match(const PointSelection& points, std::span<const std::uint8_t> excluded, const PlacedPoints& placed,
                        const Eigen::Isometry3f& T_target_local, double widening, PlaneMatches& matches) const {
-    matches.reserve(points.size());
+    matches.reserve(points.pixel.capacity());
     matches.clear();
     const auto gate = static_cast<float>(config_.gate_m * widening);
     const auto kernel = kKernel_m * static_cast<float>(widening);
     const auto min_cosine = static_cast<float>(config_.min_normal_cosine);
     const Eigen::Matrix3f R_local_target = T_target_local.linear().transpose();
-    const std::size_t step = std::max<std::size_t>(1, points.size() / static_cast<std::size_t>(config_.points));
-    for (std::size_t i = 0; i < points.size(); i += step) {
+    const std::size_t step = std::max<std::size_t>(1, excluded.size() / static_cast<std::size_t>(config_.points));
+    for (std::size_t i = 0; i < excluded.size(); i += step) {
         if (points.planarity[i] <= 0.0F || excluded[i]) continue;
         const Eigen::Vector3f p = T_target_local * Eigen::Vector3f(placed.x[i], placed.y[i], placed.z[i]);
         const Surfel& surfel = grid_[static_cast<std::size_t>(cell_of(p.data()))];

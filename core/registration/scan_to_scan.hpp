@@ -16,7 +16,7 @@
 namespace dlod {
 
 struct ScanToScanConfig {
-    int points = 1200;
+    int points = 600;
     int iterations = 3;
     double gate_m = 1.0;
     double min_normal_cosine = 0.8;
@@ -36,7 +36,7 @@ class ScanToScan {
     explicit ScanToScan(const ScanToScanConfig& config);
 
     /// Keeps the flat points of a registered scan as the next one's target.
-    /// @param excluded by point, 1: left out; empty: none
+    /// @param excluded by point, 1: left out, as are points beyond its end; empty: none is
     /// @param placed the points in that scan's local frame
     /// @param T_sensor_local sends that frame into the sensor's at the stamp
     void set_target(const PointSelection& points, std::span<const std::uint8_t> excluded, const PlacedPoints& placed,

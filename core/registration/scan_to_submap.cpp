@@ -68,9 +68,9 @@ void ScanToSubmap::match(const PointSelection& points, std::span<const std::uint
     const auto kernel = static_cast<float>(config_.kernel_m * widening);
     const float inverse_kernel2 = 1.0F / (kernel * kernel);
     const auto min_cosine = static_cast<float>(config_.min_normal_cosine);
-    matches.reserve(points.size());
+    matches.reserve(points.pixel.capacity());
     matches.clear();
-    for (std::size_t i = 0; i < points.size(); ++i) {
+    for (std::size_t i = 0; i < excluded.size(); ++i) {
         if (points.planarity[i] <= 0.0F || excluded[i]) continue;
         const float q[3] = {placed.x[i], placed.y[i], placed.z[i]};
         const Cell cell = cell_of(q, origin, side, inverse_side);
@@ -91,19 +91,27 @@ void ScanToSubmap::match(const PointSelection& points, std::span<const std::uint
 }
 
 void ScanToSubmap::residuals(const PointSelection& points, const PlacedPoints& placed, VoxelMap& map, VoxelIndex origin,
-                             AlignedVector<PixelIndex>& pixel, AlignedVector<float>& residual_m) const {
+                             AlignedVector<PixelIndex>& pixel, AlignedVector<float>& residual_m,
+                             const Image<std::uint8_t>* ground) const {
     const auto side = static_cast<float>(map.voxel_m());
     const float inverse_side = 1.0F / side;
     const auto cap = static_cast<float>(config_.residual_cap_m);
-    pixel.assign(points.pixel.begin(), points.pixel.end());
+    pixel.reserve(points.pixel.capacity());
+    residual_m.reserve(points.pixel.capacity());
+    pixel.resize(points.size());
     residual_m.resize(points.size());
+    std::size_t count = 0;
     for (std::size_t i = 0; i < points.size(); ++i) {
+        if (ground != nullptr && (*ground)[points.pixel[i]] != 0) continue;
         const float q[3] = {placed.x[i], placed.y[i], placed.z[i]};
         const Cell cell = cell_of(q, origin, side, inverse_side);
         const VoxelPlane* plane = map.find(cell.index);
-        residual_m[i] = plane != nullptr ? std::min(cap, distance_to(*plane, cell.offset))
-                                         : distance_to_neighbours(map, cell, side, cap);
+        residual_m[count] = plane != nullptr ? std::min(cap, distance_to(*plane, cell.offset))
+                                             : distance_to_neighbours(map, cell, side, cap);
+        pixel[count++] = points.pixel[i];
     }
+    pixel.resize(count);
+    residual_m.resize(count);
 }
 
 }  // namespace dlod

@@ -42,14 +42,16 @@ class ScanToSubmap {
 
     /// Finds each flat point's plane.
     /// @param placed the same points in the local frame: the world moved to the lower corner of voxel `origin`
-    /// @param excluded by point, 1: weighs nothing
+    /// @param excluded by point, 1: weighs nothing; points beyond its end take no part
     /// @param widening factor on gate and kernel: above 1 while the guess is poor
     void match(const PointSelection& points, std::span<const std::uint8_t> excluded, const PlacedPoints& placed,
                VoxelMap& map, VoxelIndex origin, double widening, PlaneMatches& matches) const;
 
-    /// Distances of all points to the nearest Gaussian of the submap around them: the residuals of the registration.
+    /// Distances of the points to the nearest Gaussian of the submap around them: the residuals of the registration.
+    /// @param ground by pixel, 1: is ground and left out; nullptr: nothing is
     void residuals(const PointSelection& points, const PlacedPoints& placed, VoxelMap& map, VoxelIndex origin,
-                   AlignedVector<PixelIndex>& pixel, AlignedVector<float>& residual_m) const;
+                   AlignedVector<PixelIndex>& pixel, AlignedVector<float>& residual_m,
+                   const Image<std::uint8_t>* ground = nullptr) const;
 
   private:
     ScanToSubmapConfig config_;

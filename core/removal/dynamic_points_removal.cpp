@@ -36,7 +36,7 @@ void DynamicPointsRemoval::process(Frame& frame, OdometryFeedback& feedback) {
     feedback.moving.clear();
     feedback.has_keyframe = false;
     feedback.cleared.clear();
-    if (!frame.odometry.valid) return;
+    if (!frame.odometry.follows_map()) return;
 
     for (OrientedBox& box : frame.detection.cleared) box.size_m.array() += 2.0 * config_.margin_m;
     feedback.cleared = frame.detection.cleared;
@@ -50,7 +50,7 @@ void DynamicPointsRemoval::label_pixels(Frame& frame) const {
     DetectionResult& result = frame.detection;
     result.instance.fill(0);
     result.dynamic_points = 0;
-    const bool valid = frame.odometry.valid;
+    const bool valid = frame.odometry.follows_map();
     if (valid) {
         label_background(frame.raw.range_mm.data(), frame.prepared.ground.data(), result.label.size(),
                          result.label.data());

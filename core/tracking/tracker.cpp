@@ -136,7 +136,7 @@ void Tracker::process(Frame& frame) {
     // A new map: what was tracked stood in the old one.
     if ((frame.odometry.flags & OdometryResult::kReinitialized) != 0) state_->objects.clear();
     state_->predict(frame);
-    if (frame.odometry.valid) {
+    if (frame.odometry.follows_map()) {
         state_->associate(frame);
         state_->attach_parts(frame);
         state_->see_and_miss(frame);

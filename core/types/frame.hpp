@@ -86,6 +86,9 @@ struct OdometryResult {
     };
     bool valid = false;             ///< false: not to be used, not written, published with its flag
     std::uint32_t flags = 0;
+    /// Good enough for seeing what moves: valid, or else registered with the local map but adrift along a direction in
+    /// which nothing is to be seen.
+    bool follows_map() const { return valid || (flags & (kDegenerate | kPredictedOnly)) == kDegenerate; }
     Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();  ///< at the frame's stamp
     Eigen::Vector3d linear_velocity_mps = Eigen::Vector3d::Zero();     ///< sensor frame
     Eigen::Vector3d angular_velocity_radps = Eigen::Vector3d::Zero();  ///< sensor frame

@@ -42,7 +42,7 @@ class OdometryRun {
             build_keyframe_cloud(
                 frame_, [&](PixelIndex pixel) { return drive_.is_moving(pixel); }, feedback.keyframe);
         ++count_;
-        const double stamp = static_cast<double>(frame_.header.stamp_ns - SimulatedDrive::kEpoch_ns) * 1e-9;
+        const double stamp = drive_.last_stamp_s();
         const OdometryResult& o = frame_.odometry;
         return frames.emplace_back(RunFrame{o.valid, o.flags, o.T_world_sensor, drive_.pose(stamp), o.covariance,
                                             o.gravity_mps2, o.linear_velocity_mps});

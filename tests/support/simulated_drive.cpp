@@ -142,6 +142,8 @@ void SimulatedDrive::fill(int k, Frame& frame) {
         }
     }
     frame.header.usable = frame.header.valid_columns * 10 >= w * 3;
+    last_stamp_s_ = static_cast<double>(frame.header.stamp_ns - kEpoch_ns) * 1e-9;
+    if (spoil_frame) spoil_frame(k, frame);
 }
 
 }  // namespace dlod::test

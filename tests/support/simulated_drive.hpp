@@ -51,6 +51,11 @@ class SimulatedDrive {
     /// Time of a frame's stamp in seconds.
     double stamp_s(int k) const;
 
+    /// Time at which the last frame's stamp was taken, seconds, whatever spoil_frame has made of it.
+    double last_stamp_s() const { return last_stamp_s_; }
+
+    /// Changes a frame after it has been filled.
+    std::function<void(int frame, Frame&)> spoil_frame;
     /// Changes each IMU sample before it goes into a frame.
     std::function<void(ImuSample&)> spoil_imu;
     /// False: the column is lost.
@@ -74,6 +79,7 @@ class SimulatedDrive {
     std::mt19937_64 random_;
     std::normal_distribution<double> normal_;
     double next_imu_s_ = 0.003;
+    double last_stamp_s_ = 0.0;
 };
 
 }  // namespace dlod::test

@@ -1,0 +1,32 @@
+// Which directions the prediction holds, from frame to frame.
+#pragma once
+
+#include "core/registration/observability.hpp"
+
+namespace dlod {
+
+/// A direction is let go of as soon as the matches do not show it. It is taken back reluctantly: what comes into view
+/// in a tunnel are first of all people and vehicles, and for some frames these look like structure. So more has to face
+/// it than would have kept it, for several frames on end.
+class HeldDirections {
+  public:
+    /// Judges the matches of a stage's first iteration.
+    /// @param with_imu the prediction is good for some seconds: there is no hurry to take a direction back
+    void judge(const PlaneMatches& matches, const NormalEquations& equations, bool with_imu);
+    /// The last judgement.
+    const Observability& observability() const { return observability_; }
+    /// Nothing has been judged in this frame yet.
+    void begin_frame();
+    /// The frame has been registered after the last judgement.
+    void end_frame();
+    /// Nothing is known of earlier frames.
+    void reset() { *this = {}; }
+
+  private:
+    Observability observability_;
+    bool adrift_ = false;
+    bool shows_all_ = false;  ///< enough faces all directions, for taking them back
+    int frames_showing_all_ = 0;
+};
+
+}  // namespace dlod

@@ -1,0 +1,90 @@
+// What is said of a frame: pose, covariance, validity, deskewed cloud, residuals.
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "core/odometry/deskew.hpp"
+#include "core/odometry/odometry_state.hpp"
+
+namespace dlod {
+namespace {
+
+// A predicted pose is valid for this long at most.
+constexpr double kMaxPrediction_s = 1.0;
+// Every n-th point serves for the median range.
+constexpr std::size_t kMedianStep = 4;
+
+}  // namespace
+
+void Odometry::State::write_result(Frame& frame) {
+    OdometryResult& out = frame.odometry;
+    const double since_registered = static_cast<double>(frame.header.stamp_ns - last_registered_ns) * 1e-9;
+    out.T_world_sensor = filter.T_world_sensor();
+    out.linear_velocity_mps = filter.sensor_linear_velocity();
+    out.angular_velocity_radps = filter.sensor_angular_velocity();
+    const Matrix6d deviation = filter.pose_covariance();
+    if (registered) update_anchor(out.T_world_sensor.translation());
+    out.covariance = deviation + anchor;
+    out.gravity_mps2 = filter.state().gravity_mps2;
+    out.iterations = iterations;
+    out.correspondences = static_cast<int>(registered ? matches.count : 0);
+    out.flags = flags | (filter.uses_imu() ? OdometryResult::kImuUsed : 0U) |
+                (registered ? 0U : OdometryResult::kPredictedOnly);
+    const double largest_variance =
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(deviation.topLeftCorner<3, 3>(), Eigen::EigenvaluesOnly)
+            .eigenvalues()[2];
+    out.valid = trusted && (registered || since_registered < kMaxPrediction_s) &&
+                largest_variance < config.max_deviation_m * config.max_deviation_m;
+    deskew(sensor, motion, frame);
+    place(frame.prepared.points, motion, placed);
+    scan_to_submap.residuals(frame.prepared.points, placed, keyframes.submap(), origin, out.residual_pixel,
+                             out.residual_m, &frame.prepared.ground);
+    // A first scan has been deskewed without its velocity: it is no keyframe.
+    out.keyframe =
+        registered && !bootstrapping && keyframes.is_due(out.T_world_sensor, median_range(frame.prepared.points));
+    if (out.keyframe) keyframes.announce(out.T_world_sensor, out.covariance);
+}
+
+/// How uncertain the submap is that the pose rests on. Along what is held that is still the one that was left behind:
+/// what has happened since then is in the filter's own uncertainty.
+void Odometry::State::update_anchor(const Eigen::Vector3d& position_m) {
+    const Observability::Directions u = held.observability().directions();
+    const Matrix6d along = u * u.transpose();
+    const Matrix6d free = Matrix6d::Identity() - along;
+    anchor = (along * anchor * along + free * keyframes.anchor_covariance(position_m) * free).eval();
+}
+
+/// Nothing of whichever frame was here before remains: all runs give the same.
+void Odometry::State::write_nothing(Frame& frame) const {
+    OdometryResult& out = frame.odometry;
+    out.T_world_sensor = started ? filter.T_world_sensor() : Eigen::Isometry3d::Identity();
+    out.linear_velocity_mps.setZero();
+    out.angular_velocity_radps.setZero();
+    out.covariance.setZero();
+    out.gravity_mps2 = filter.state().gravity_mps2;
+    out.valid = false;
+    out.keyframe = false;
+    out.flags = OdometryResult::kPredictedOnly;
+    out.iterations = 0;
+    out.correspondences = 0;
+    out.residual_pixel.clear();
+    out.residual_m.clear();
+    for (auto* image : {&out.x, &out.y, &out.z}) image->fill(0.0F);
+}
+
+/// Spaciousness: median range of the selected points, smoothed over the frames.
+double Odometry::State::median_range(const PointSelection& points) {
+    ranges.clear();
+    ranges.reserve(points.pixel.capacity());
+    for (std::size_t i = 0; i < points.size(); i += kMedianStep) {
+        ranges.push_back(points.x[i] * points.x[i] + points.y[i] * points.y[i] + points.z[i] * points.z[i]);
+    }
+    if (ranges.empty()) return spaciousness_m;
+    const auto middle = ranges.begin() + static_cast<std::ptrdiff_t>(ranges.size() / 2);
+    std::nth_element(ranges.begin(), middle, ranges.end());
+    const double median = std::sqrt(static_cast<double>(*middle));
+    spaciousness_m = spaciousness_m > 0.0 ? 0.9 * spaciousness_m + 0.1 * median : median;
+    return spaciousness_m;
+}
+
+}  // namespace dlod

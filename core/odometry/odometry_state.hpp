@@ -1,0 +1,102 @@
+// What the odometry knows, and the steps of a frame. The steps are in three files: the course of a frame, starts and
+// restarts (odometry.cpp), its registration (frame_registration.cpp), and what is said of it (odometry_result.cpp).
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/map/keyframe_database.hpp"
+#include "core/odometry/held_directions.hpp"
+#include "core/odometry/imu_buffer.hpp"
+#include "core/odometry/imu_monitor.hpp"
+#include "core/odometry/motion_filter.hpp"
+#include "core/odometry/moving_points.hpp"
+#include "core/odometry/odometry.hpp"
+#include "core/registration/placed_points.hpp"
+#include "core/registration/scan_to_scan.hpp"
+#include "core/registration/scan_to_submap.hpp"
+
+namespace dlod {
+
+struct Odometry::State {
+    State(const SensorModel& sensor_model, const OdometryConfig& configuration);
+
+    void process(Frame& frame, const OdometryFeedback* feedback);
+
+  private:
+    static constexpr double kMaxSweep_s = 0.5;
+    /// Of two registrations one is better with so many times more matches near their planes.
+    static constexpr double kClearlyBetter = 1.2;
+
+    void apply(const OdometryFeedback& feedback);
+    void start(const Frame& frame, const Eigen::Isometry3d& T_world_sensor);
+    void restart(const Frame& frame);
+    static std::size_t taking_part(const PointSelection& points);
+    static std::size_t flat_points(const Frame& frame);
+    bool estimate(const Frame& frame);
+    void choose_motion_model(const Frame& frame);
+    bool imu_is_consistent();
+    void retry_without_imu(const Frame& frame, const MotionFilter& before);
+    void use_constant_velocity();
+    void bootstrap(const Frame& frame);
+    void register_frame(const Frame& frame, int first_stage_iterations, double widening);
+    void register_widely(const Frame& frame);
+    void place_provisional();
+    bool is_trustworthy();
+    void choose_origin();
+    void update_sweep(const Frame& frame);
+    void place_target(const PointSelection& points, std::span<const std::uint8_t> without,
+                      const Eigen::Isometry3d& T_world_sensor);
+    void see_turn(std::int64_t stamp_ns);
+    void update_anchor(const Eigen::Vector3d& position_m);
+    void write_result(Frame& frame);
+    void write_nothing(Frame& frame) const;
+    Eigen::Vector3d mean_force(const Frame& frame) const;
+    double median_range(const PointSelection& points);
+
+    SensorModel sensor;
+    OdometryConfig config;
+    ImuBuffer imu;
+    ImuMonitor monitor;
+    MotionFilter filter;
+    KeyframeDatabase keyframes;
+    ScanToScan scan_to_scan;
+    ScanToSubmap scan_to_submap;
+    MovingPoints moving;
+
+    bool started = false;
+    std::uint64_t map_sequence = 0;  ///< of the frame that the map began with
+    bool bootstrapping = false;      ///< the map is one scan that has not been deskewed for its velocity
+    MotionFilter first_filter;       ///< while bootstrapping: at the stamp of that scan
+    PointSelection first_points;     ///< while bootstrapping: of that scan
+    double first_duration_s = 0.0;   ///< while bootstrapping: of that scan
+    HeldDirections held;
+    std::int64_t last_registered_ns = 0;
+    Matrix6d anchor = Matrix6d::Zero();                                ///< covariance of what the pose is relative to
+    Eigen::Isometry3d T_world_target = Eigen::Isometry3d::Identity();  ///< pose of the first stage's target scan
+    std::int64_t target_ns = 0;                                        ///< its stamp
+    Eigen::Quaterniond target_rotation = Eigen::Quaterniond::Identity();  ///< of the body
+    Eigen::Vector3d lidar_rate_radps = Eigen::Vector3d::Zero();  ///< body, between the last two registered scans
+
+    // Of the present frame.
+    std::uint32_t flags = 0;
+    bool registered = false;
+    bool trusted = true;  ///< false: what this frame gives is not to be used
+    SweepMotion motion;
+    PlacedPoints placed;  ///< the frame's points after that motion
+    VoxelIndex origin;
+    Eigen::Vector3d origin_m = Eigen::Vector3d::Zero();
+    std::size_t candidates = 0;  ///< points that might have found a counterpart
+    std::size_t near = 0;        ///< matches that lie on their planes
+    double usual_near = 0.0;     ///< the same over the last frames
+    PlaneMatches matches;
+    NormalEquations equations;
+    AlignedVector<std::uint8_t> excluded;
+    std::vector<float> ranges;
+    double spaciousness_m = 0.0;
+    int iterations = 0;
+};
+
+}  // namespace dlod

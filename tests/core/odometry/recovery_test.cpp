@@ -1,0 +1,120 @@
+// What happens to frames and clocks, and that nothing is given as good that is not.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "tests/support/odometry_run.hpp"
+
+namespace dlod::test {
+namespace {
+
+constexpr std::uint32_t kReinitialized = OdometryResult::kReinitialized;
+
+/// Straight on at 1.5 m/s, turning slowly.
+Eigen::Isometry3d drive_on(double t) {
+    Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+    T.translation() = Eigen::Vector3d(-4.0 + 1.5 * t, 0.05 * std::sin(6.0 * t), 0.0);
+    T.linear() = Eigen::AngleAxisd(0.2 * t, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+    return T;
+}
+
+void move_clock(Frame& frame, std::int64_t offset_ns) {
+    frame.header.stamp_ns += offset_ns;
+    frame.header.first_stamp_ns += offset_ns;
+    for (std::int64_t& time : frame.columns.time_ns) time += time != 0 ? offset_ns : 0;
+}
+
+/// Ranges that belong to nothing.
+void fill_with_noise(Frame& frame) {
+    std::mt19937 random(5);
+    std::uniform_int_distribution<std::uint32_t> range(1000, 30000);
+    for (std::size_t i = 0; i < frame.raw.range_mm.size(); ++i) {
+        if (frame.raw.range_mm[i] == 0) continue;
+        const std::uint32_t r = range(random);
+        const float factor = static_cast<float>(r) / static_cast<float>(frame.raw.range_mm[i]);
+        frame.raw.range_mm[i] = r;
+        for (auto* image : {&frame.cloud.range_m, &frame.cloud.x, &frame.cloud.y, &frame.cloud.z}) {
+            (*image)[i] *= factor;
+        }
+    }
+}
+
+void expect_good_from(const OdometryRun& run, std::size_t first) {
+    for (std::size_t i = first; i < run.frames.size(); ++i) {
+        EXPECT_TRUE(run.frames[i].valid) << i;
+        EXPECT_LT(run.relative_error(first, i).translation().norm(), 0.05) << i;
+    }
+}
+
+class FirstFrame : public testing::TestWithParam<bool> {};
+
+TEST_P(FirstFrame, OfNoiseIsNotValid) {
+    SimulatedDrive drive(furnished_room(), drive_on);
+    drive.spoil_frame = [](int k, Frame& frame) {
+        if (k == 0) fill_with_noise(frame);
+    };
+    OdometryConfig config;
+    config.use_imu = GetParam();
+    OdometryRun run(drive, config);
+    run.run(0, 20);
+    EXPECT_FALSE(run.frames[0].valid);
+    expect_good_from(run, 3);
+}
+
+TEST_P(FirstFrame, ThatIsNearlyEmptyIsNotValid) {
+    SimulatedDrive drive(furnished_room(), drive_on);
+    drive.spoil_frame = [](int k, Frame& frame) {
+        if (k > 0) return;
+        for (std::size_t i = 0; i < frame.raw.range_mm.size(); ++i) {
+            if (i % 97 == 0) continue;
+            frame.raw.range_mm[i] = 0;
+            for (auto* image : {&frame.cloud.range_m, &frame.cloud.x, &frame.cloud.y, &frame.cloud.z}) {
+                (*image)[i] = 0.0F;
+            }
+        }
+    };
+    OdometryConfig config;
+    config.use_imu = GetParam();
+    OdometryRun run(drive, config);
+    run.run(0, 20);
+    EXPECT_FALSE(run.frames[0].valid);
+    expect_good_from(run, 3);
+}
+
+INSTANTIATE_TEST_SUITE_P(Odometry, FirstFrame, testing::Bool());
+
+struct ClockStep {
+    const char* name;
+    double lidar_s;
+    bool imu_too;
+};
+
+class SteppedClock : public testing::TestWithParam<ClockStep> {};
+
+TEST_P(SteppedClock, RestartsWhereItWas) {
+    constexpr int kStep = 20;
+    const auto offset_ns = static_cast<std::int64_t>(GetParam().lidar_s * 1e9);
+    SimulatedDrive drive(furnished_room(), drive_on);
+    drive.spoil_frame = [&](int k, Frame& frame) {
+        if (k < kStep) return;
+        move_clock(frame, offset_ns);
+        if (!GetParam().imu_too) return;
+        for (ImuSample& s : frame.imu) s.stamp_ns += offset_ns;
+    };
+    OdometryRun run(drive, {});
+    run.run(0, 45);
+    EXPECT_TRUE(run.frames[kStep].flags & kReinitialized);
+    EXPECT_FALSE(run.frames[kStep].valid);
+    expect_good_from(run, kStep + 2);
+    EXPECT_LT(run.relative_error(kStep - 1, run.frames.size() - 1).translation().norm(), 0.5);
+}
+
+INSTANTIATE_TEST_SUITE_P(Odometry, SteppedClock,
+                         testing::Values(ClockStep{"LidarAloneBack", -3.0, false},
+                                         ClockStep{"LidarAloneFarBack", -900.0, false},
+                                         ClockStep{"BothBack", -3.0, true}, ClockStep{"LidarAloneForward", 30.0, false},
+                                         ClockStep{"BothForward", 30.0, true}),
+                         [](const auto& test) { return test.param.name; });
+
+}  // namespace
+}  // namespace dlod::test
