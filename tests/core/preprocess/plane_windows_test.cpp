@@ -102,9 +102,10 @@ Window slow_window(const SensorModel& sensor, const Frame& frame, int row, int c
     return window;
 }
 
-Eigen::Vector3d normal_of(const PlaneWindows& windows, const PlaneRow& planes, int row, int k, int step) {
+Eigen::Vector3d normal_of(const SensorModel& sensor, const PlaneWindows& windows, const PlaneRow& planes, int row,
+                          int k, int step) {
     const auto i = static_cast<std::size_t>(k);
-    const BeamFrame beam = windows.beam(row, k * step);
+    const BeamFrame beam = windows.beam(row, sensor.measurement_of(row, k * step));
     const Eigen::Vector3f n = -(planes.inverse_range[i] * beam.direction + planes.slope_azimuth[i] * beam.along_row +
                                 planes.slope_altitude[i] * beam.up);
     return n.normalized().cast<double>();
@@ -137,7 +138,7 @@ Errors compare(const SensorModel& sensor, const Eigen::Vector3d& normal, double 
             if (normal.dot(beam.direction) < 0.3) continue;  // grazing: nothing is known well
             const Window slow = slow_window(sensor, frame, row, k * step);
             const double truth_m = (offset - normal.dot(beam.origin)) / normal.dot(beam.direction);
-            const Eigen::Vector3d n = normal_of(windows, planes, row, k, step);
+            const Eigen::Vector3d n = normal_of(sensor, windows, planes, row, k, step);
             const double range_m = 1.0 / static_cast<double>(planes.inverse_range[i]);
             errors.fast_angle2 += std::pow(angle_deg(n, -normal), 2);
             errors.slow_angle2 += std::pow(angle_deg(slow.normal, -normal), 2);
@@ -287,7 +288,7 @@ TEST(PlaneWindows, BeamsAreThoseOfTheSensor) {
     const PlaneWindows windows(sensor, 1);
     for (int r = 0; r < sensor.height; ++r) {
         for (int c = 0; c < sensor.width; c += 7) {
-            const BeamFrame beam = windows.beam(r, c);
+            const BeamFrame beam = windows.beam(r, sensor.measurement_of(r, c));
             EXPECT_LT((beam.direction.cast<double>() - beam_of(sensor, r, c).direction).norm(), 1e-6);
             // Tangents: a right-handed frame, one along growing columns, one up.
             EXPECT_LT(std::abs(beam.direction.dot(beam.along_row)), 1e-6F);
