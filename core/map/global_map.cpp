@@ -78,7 +78,10 @@ struct GlobalMap::State {
           cells(map.cell_m, rule),
           waiting(static_cast<std::size_t>(map.delay_frames) + 1) {
         // As large as it may become, once and for all.
-        for (Postponed& p : waiting) p.points.resize(selected_capacity());
+        for (Postponed& p : waiting) {
+            p.points.resize(selected_capacity());
+            p.points.resize(0);
+        }
         selected.resize(selected_capacity());
         enters.resize(static_cast<std::size_t>(sensor.width));
     }

@@ -105,6 +105,17 @@ TEST_F(GlobalMapTest, FramesWithoutAPoseAndFarPointsStayOut) {
     EXPECT_TRUE(map.points().empty());
 }
 
+TEST_F(GlobalMapTest, HoldsNothingThatNoFrameShowed) {
+    config.confirm_s = 0.0;
+    GlobalMap map(sensor, config);
+    for (int k = 0; k < 3; ++k) {
+        map.finish();
+        for (const MapPoint& p : map.points()) EXPECT_NEAR(p.x, 5.0F, 0.01F);
+        see_wall();
+        map.update(scene.frame);
+    }
+}
+
 TEST_F(GlobalMapTest, IsBoundedAndForgetsTheFarthest) {
     config.confirm_s = 0.0;  // each place is seen for a moment only
     config.max_points = 2000;
