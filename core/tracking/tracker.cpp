@@ -19,6 +19,7 @@ constexpr double kLimbMargin_m = 0.4;      // and that of a small piece beside a
 constexpr double kSplinterMargin_m = 0.8;  // and of a splinter at the corners of a vehicle
 constexpr unsigned kSplinter = 10;         // that is so much smaller
 constexpr unsigned kLimb = 3;              // small: a third of the object's pixels
+constexpr double kLowLimb = 0.5;           // of the object's height
 constexpr double kInside = 0.6;            // of its footprint lies inside of those margins
 constexpr double kInsideVehicle = 0.8;     // or of a moving vehicle's box itself
 constexpr double kSimilar = 1.5;           // ratio of footprint diagonals
@@ -68,6 +69,13 @@ bool one_vehicle(const TrackedObject& whole, const TrackedObject& piece) {
     const double tolerance = kSameVelocity_mps + 2.0 * (whole.velocity_sd() + piece.velocity_sd());
     return differs < tolerance && share_inside(piece.box(), whole.box(), kLimbMargin_m) > kInside &&
            piece.box().size_m.head<2>().norm() < whole.box().size_m.head<2>().norm();
+}
+
+/// A track on something low inside of a moving object's box has followed an arm or a leg.
+bool is_limb_of(const TrackedObject& host, const TrackedObject& guest) {
+    return host.state() == DynamicState::kDynamic && host.hits() >= kYoungHits &&
+           guest.box().size_m.z() < kLowLimb * host.box().size_m.z() &&
+           share_inside(guest.box(), host.box(), kPartMargin_m) > kInside;
 }
 
 /// Whether a track that is seen may be the object of one that is not: what moves is not taken for something that rests,
@@ -196,7 +204,8 @@ void Tracker::State::attach_parts(Frame& frame) {
             if (guest != nullptr) {
                 const bool on_top = host.id() < guest->id() && stacked(detections[other].box, detections[d].box);
                 const bool young = guest->hits() < kYoungHits && host.hits() >= 2 * guest->hits();
-                if (!on_top && !young && !one_vehicle(host, *guest)) continue;
+                const bool piece = kLimb * detections[d].count < detections[other].count && is_limb_of(host, *guest);
+                if (!on_top && !young && !piece && !one_vehicle(host, *guest)) continue;
                 if (on_top) reach = kLimbMargin_m;
             } else if (host.state() == DynamicState::kDynamic &&
                        kLimb * detections[d].count < detections[other].count) {
