@@ -82,7 +82,7 @@ UdpSource::UdpSource(UdpOptions options) : options_(std::move(options)) {
                           options_.multicast_group + " must both be IPv4 or both IPv6");
     }
 
-    options_.batch = std::clamp(options_.batch, 1, 1024);
+    options_.batch = std::clamp(options_.batch, static_cast<int>(kMostSockets), 1024);
     options_.largest_datagram = std::clamp(options_.largest_datagram, 64, 65536);
     const auto batch = static_cast<std::size_t>(options_.batch);
     const auto largest = static_cast<std::size_t>(options_.largest_datagram);
@@ -109,6 +109,10 @@ UdpSource::UdpSource(UdpOptions options) : options_(std::move(options)) {
             if (!open) open_socket(port);
         }
         if (!options_.forward_to.empty()) open_forwarder();
+        for (std::size_t i = 0; i < sockets_.size(); ++i) {
+            sockets_[i].room = batch / sockets_.size();
+            sockets_[i].first = i * sockets_[i].room;
+        }
     } catch (...) {
         for (const Socket& s : sockets_) ::close(s.fd);
         throw;
@@ -272,12 +276,14 @@ void UdpSource::stop() noexcept {
 PacketBatch UdpSource::next() {
     if (stopped_.load(std::memory_order_relaxed)) return {.status = SourceStatus::kStopped, .packets = {}};
 
+    const bool some_left =
+        std::any_of(sockets_.begin(), sockets_.end(), [](const Socket& s) { return !s.received.empty(); });
     std::array<pollfd, kMostSockets + 1> polled{};
     for (std::size_t i = 0; i < sockets_.size(); ++i) polled[i] = {sockets_[i].fd, POLLIN, 0};
     polled[sockets_.size()] = {stop_.fd(), POLLIN, 0};
-    const int ready = ::poll(polled.data(), sockets_.size() + 1, options_.timeout_ms);
+    const int ready = ::poll(polled.data(), sockets_.size() + 1, some_left ? 0 : options_.timeout_ms);
     if (polled[sockets_.size()].revents != 0) return {.status = SourceStatus::kStopped, .packets = {}};
-    if (ready <= 0) {
+    if (ready <= 0 && !some_left) {
         idle_ms_ += options_.timeout_ms;
         if (group_ && idle_ms_ >= kRejoinAfterMs) {
             idle_ms_ = 0;
@@ -287,22 +293,19 @@ PacketBatch UdpSource::next() {
     }
     idle_ms_ = 0;
 
-    // Every ready socket gets its share of the batch, the last one what is left.
-    auto waiting = static_cast<std::size_t>(std::count_if(polled.begin(), polled.begin() + sockets_.size(),
-                                                          [](const pollfd& p) { return p.revents != 0; }));
-    std::size_t used = 0;
     for (std::size_t i = 0; i < sockets_.size(); ++i) {
         Socket& s = sockets_[i];
-        s.received = {};
+        if (!s.received.empty()) continue;
+        s.more_may_wait = false;
         if (polled[i].revents == 0) continue;
-        const std::size_t share = (messages_.size() - used) / waiting--;
-        const std::size_t messages = receive(s, used, share);
+        const std::size_t messages = receive(s, s.first, s.room);
         std::size_t count = 0;
-        for (std::size_t m = used; m < used + messages; ++m) {
-            if (take_message(s, messages_[m], packets_[used + count])) ++count;
+        for (std::size_t m = s.first; m < s.first + messages; ++m) {
+            if (take_message(s, messages_[m], packets_[s.first + count])) ++count;
         }
-        s.received = std::span(packets_).subspan(used, count);
-        used += messages;
+        s.received = std::span(packets_).subspan(s.first, count);
+        // Nobody waits for a port at which only refused packets come.
+        s.more_may_wait = messages == s.room && count > 0;
     }
     const std::span<const Packet> packets = merge_received();
     if (packets.empty()) return {.status = SourceStatus::kIdle, .packets = {}};
@@ -314,10 +317,13 @@ PacketBatch UdpSource::next() {
 std::span<const Packet> UdpSource::merge_received() {
     // By stamps between the sockets, but never against the order of one socket: a clock that is set back, or stamps
     // that the kernel makes up late for what came before it had begun to stamp, must not reorder a sensor's packets.
+    // What was read of one socket waits for what the other has not been read of: after a stall, the few IMU packets
+    // would be seconds ahead of the lidar's.
     std::size_t count = 0;
     for (;;) {
         Socket* first = nullptr;
         for (Socket& s : sockets_) {
+            if (s.received.empty() && s.more_may_wait) return std::span(merged_).first(count);
             if (s.received.empty()) continue;
             if (first == nullptr || s.received[0].receive_ns < first->received[0].receive_ns) first = &s;
         }

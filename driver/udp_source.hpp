@@ -27,7 +27,7 @@ struct UdpOptions {
     std::string forward_to;              ///< "address" or "address:port" that gets a copy of every packet accepted
     int receive_buffer_bytes = 8 << 20;  ///< a socket; the kernel counts its overhead on top, about as much again
     int timeout_ms = 100;                ///< after which next() returns kIdle
-    int batch = 64;                      ///< packets a call, at most
+    int batch = 64;                      ///< packets a call, at most; shared equally by the sockets
     int largest_datagram = 65536;        ///< bytes of memory a packet of the batch
 };
 
@@ -66,7 +66,10 @@ class UdpSource final : public PacketSource {
         int fd = -1;
         std::uint16_t port = 0;
         std::uint32_t kernel_drops = 0;    ///< the kernel's running count
-        std::span<const Packet> received;  ///< in this batch, not yet merged
+        std::size_t first = 0;             ///< of its share of the batch's memory
+        std::size_t room = 0;              ///< and how many packets that holds
+        std::span<const Packet> received;  ///< not yet handed out
+        bool more_may_wait = false;        ///< the last time, all its room was filled
     };
 
     void open_socket(std::uint16_t port);

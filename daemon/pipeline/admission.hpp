@@ -9,7 +9,7 @@ namespace dlod::daemon {
 
 /// Keeps the time from a frame's last packet to its publication within a bound. A frame that could not be published in
 /// time any more is not begun; while frames at work side by side hold each other up beyond the bound, one is worked on
-/// at a time. What to expect is learnt from the frames before: quickly when it gets worse, slowly when it gets better.
+/// at a time. What to expect is learnt from the frames before: at once when it gets worse, slowly when it gets better.
 ///
 /// taken() is for the thread that takes frames, published() for the one that publishes them; the rest for any.
 class Admission {
@@ -40,18 +40,18 @@ class Admission {
         return {now_ns, taken_.load(), alone};
     }
     void published(const Mark& mark, std::int64_t now_ns) {
-        const std::int64_t took_ns = now_ns - mark.taken_ns;
-        if (mark.alone && taken_.load() == mark.number) {
-            const std::int64_t expected_ns = alone_ns_.load();
-            const std::int64_t excess_ns = took_ns - expected_ns;
-            alone_ns_.store(expected_ns + excess_ns / (excess_ns > 0 ? 2 : 16));
-        }
-        const std::int64_t shared_ns = shared_ns_.load();
-        shared_ns_.store(std::max(took_ns, shared_ns - (shared_ns - took_ns) / 128));
+        // Beyond twice the bound it makes no difference, and would be remembered for long.
+        const std::int64_t took_ns = std::min(now_ns - mark.taken_ns, 2 * bound_ns_);
+        if (mark.alone && taken_.load() == mark.number) learn(alone_ns_, took_ns, 16);
+        learn(shared_ns_, took_ns, 128);
         published_.store(published_.load() + 1);
     }
 
   private:
+    static void learn(std::atomic<std::int64_t>& expected_ns, std::int64_t took_ns, std::int64_t frames) {
+        const std::int64_t before_ns = expected_ns.load();
+        expected_ns.store(std::max(took_ns, before_ns - (before_ns - took_ns) / frames));
+    }
     std::uint64_t at_work() const { return taken_.load() - published_.load(); }
 
     const std::int64_t bound_ns_;

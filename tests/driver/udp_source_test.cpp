@@ -201,6 +201,17 @@ TEST(UdpSource, CountsTruncatedDatagrams) {
     EXPECT_EQ(counter(source, "packets_truncated"), 1U);
 }
 
+TEST(UdpSource, KeepsOrderAcrossPortsAfterAStall) {
+    UdpSource source(local({0, 0}));
+    const auto ports = source.ports();
+    Sender sender;
+    constexpr unsigned kCount = 600;  // many batches, one port's packets six times as frequent
+    for (unsigned i = 0; i < kCount; ++i) sender.send("127.0.0.1", ports[i % 7 == 6 ? 1 : 0], pattern(100, i));
+    const auto all = receive(source, kCount);
+    ASSERT_EQ(all.size(), kCount);
+    for (unsigned i = 0; i < kCount; ++i) EXPECT_EQ(all[i].data, pattern(100, i)) << i;
+}
+
 TEST(UdpSource, CountsWhatTheKernelDrops) {
     UdpOptions options = local();
     options.receive_buffer_bytes = 1;  // already granted: stays as it is

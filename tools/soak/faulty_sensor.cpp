@@ -64,7 +64,9 @@ bool FaultySensor::over() const {
 
 void FaultySensor::run() {
     start_ = Clock::now();
-    std::thread stranger([this] { send_garbage(); });
+    std::thread stranger([this] {
+        if (options_.garbage_per_second > 0.0) send_garbage();
+    });
     const auto laps_between_restarts =
         std::max<std::int64_t>(1, std::llround(options_.restart_every_s * 1e9 / static_cast<double>(lap_ns_)));
     for (std::int64_t lap = 0; !over(); ++lap) send_lap(lap, (lap + 1) % laps_between_restarts == 0);
@@ -90,7 +92,8 @@ void FaultySensor::send_lap(std::int64_t lap, bool restart_at_end) {
             if (restart_at_end && in_lap_ns > lap_ns_ - kRestart_ns) continue;
             std::int64_t due_ns = lap * lap_ns_ + in_lap_ns;
             const double due_s = 1e-9 * static_cast<double>(due_ns);
-            const double since_burst_s = std::fmod(due_s, options_.burst_every_s);
+            const bool bursts_come = options_.burst_every_s > 0.0;
+            const double since_burst_s = bursts_come ? std::fmod(due_s, options_.burst_every_s) : kBurst_s;
             if (since_burst_s < kBurst_s) due_ns += std::llround(1e9 * (kBurst_s - since_burst_s));
             std::this_thread::sleep_until(start_ + nanoseconds(due_ns));
 
@@ -106,8 +109,7 @@ void FaultySensor::send_lap(std::int64_t lap, bool restart_at_end) {
             sim::shift_lidar_packet(bytes, layout_, shift);
             pass_lidar(bytes);
             const std::lock_guard lock(mutex_);
-            const auto bursts = static_cast<std::uint64_t>(due_s / options_.burst_every_s) + 1;
-            totals_.bursts = std::max(totals_.bursts, bursts);
+            if (bursts_come) totals_.bursts = static_cast<std::uint64_t>(due_s / options_.burst_every_s) + 1;
             totals_.restarts = restarts_;
             if (in_lap_ns / turn_ns_ >= counted_turns) {
                 ++counted_turns;

@@ -22,6 +22,7 @@ struct Options {
     std::string prefix = "SOAK_";
     double minutes = 5.0;
     int port = 7502;
+    FaultySensorOptions faults;
     double most_error_m = 0.1;
     double most_latency_ms = 200.0;
 };
@@ -117,7 +118,7 @@ bool judge(const std::vector<Row>& rows, const Options& options) {
 
 int run(const Options& options) {
     const std::string prefix = options.drive;
-    FaultySensorOptions faults;
+    FaultySensorOptions faults = options.faults;
     faults.sensor = driver::load_metadata(prefix + ".json");
     const TruthPath truth(prefix + "_truth/poses_tum.txt", std::llround(1e9 * faults.sensor.model.frame_period_s));
     faults.capture = prefix + ".pcap";
@@ -167,6 +168,12 @@ int main(int argc, char** argv) {
         ->capture_default_str();
     app.add_option("--minutes", options.minutes)->check(CLI::Range(0.1, 10000.0))->capture_default_str();
     app.add_option("--port", options.port, "dlod's lidar port on this host; IMU: the next one")->capture_default_str();
+    app.add_option("--loss", options.faults.loss, "share of the packets")->capture_default_str();
+    app.add_option("--duplication", options.faults.duplication, "share of the packets")->capture_default_str();
+    app.add_option("--reordering", options.faults.reordering, "share of the packets")->capture_default_str();
+    app.add_option("--burst-every", options.faults.burst_every_s, "s; 0: none")->capture_default_str();
+    app.add_option("--restart-every", options.faults.restart_every_s, "s; at the end of a lap")->capture_default_str();
+    app.add_option("--garbage", options.faults.garbage_per_second, "packets/s; 0: none")->capture_default_str();
     app.add_option("--most-error", options.most_error_m, "m")->capture_default_str();
     app.add_option("--most-latency", options.most_latency_ms, "p99, ms")->capture_default_str();
     CLI11_PARSE(app, argc, argv);
