@@ -7,12 +7,14 @@
 #include "core/types/frame.hpp"
 
 #include <array>
+#include <optional>
 
 namespace dlod {
 
 /// Each step touches members of its own: different threads may run different steps side by side on different frames, as
 /// long as each step sees the frames in order, a frame passes the steps in order, and the feedback of the n-th frame
-/// reaches estimate_pose of frame n + kFeedbackDelay.
+/// reaches estimate_pose of frame n + kFeedbackDelay. With a frame whose `restart` is set everything begins anew: pose,
+/// maps and tracks are those of a first frame, only track ids go on.
 class DynamicLidarOdometry {
   public:
     DynamicLidarOdometry(const SensorModel& sensor, const MethodConfig& config);
@@ -24,8 +26,9 @@ class DynamicLidarOdometry {
     void subsample(Frame& frame);
     void remove_ground(Frame& frame);
     void segment(Frame& frame);
-    /// Two-stage registration. @param feedback of the frame kFeedbackDelay before, nullptr for the first ones
-    void estimate_pose(Frame& frame, const OdometryFeedback* feedback);
+    /// Two-stage registration. @param feedback of the frame kFeedbackDelay before; the first ones after a start have none
+    /// and do not look at it
+    void estimate_pose(Frame& frame, const OdometryFeedback& feedback);
     // Without a pose that follows the map nothing is detected and tracks are predicted only; with the handling of
     // dynamic objects off there are none.
     void detect(Frame& frame);
@@ -34,19 +37,21 @@ class DynamicLidarOdometry {
     void remove_dynamic_points(Frame& frame, OdometryFeedback& feedback);
     void update_map(const Frame& frame);
 
-    GlobalMap& map() { return map_; }
-    const Image<float>& residual_image() const { return detector_.residual_image(); }
+    GlobalMap& map() { return *map_; }
+    const Image<float>& residual_image() const { return detector_->residual_image(); }
 
   private:
-    bool handle_dynamic_objects_;
+    SensorModel sensor_;
+    MethodConfig config_;
     Subsampling subsampling_;
-    GroundRemoval ground_removal_;
+    std::optional<GroundRemoval> ground_removal_;  // what remembers earlier frames is made anew at a restart
     RangeImageSegmentation segmentation_;
-    Odometry odometry_;
-    Detector detector_;
-    Tracker tracker_;
+    std::optional<Odometry> odometry_;
+    std::optional<Detector> detector_;
+    std::optional<Tracker> tracker_;
     DynamicPointsRemoval removal_;
-    GlobalMap map_;
+    std::optional<GlobalMap> map_;
+    int poses_since_start_ = 0;  ///< up to kFeedbackDelay
     std::array<OdometryFeedback, kFeedbackDelay> feedback_;  ///< of process(): a ring over the frames
     std::uint64_t frames_ = 0;
 };

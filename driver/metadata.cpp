@@ -371,6 +371,10 @@ void read_ports(const Reader& reader, SensorInfo& info) {
 
 }  // namespace
 
+std::string SensorInfo::description() const {
+    return product_line + ' ' + serial_number + ' ' + firmware + ' ' + lidar_mode + ' ' + profile_name;
+}
+
 std::uint64_t SensorInfo::serial() const {
     std::uint64_t number = 0;
     const char* end = serial_number.data() + serial_number.size();

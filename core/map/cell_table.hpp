@@ -71,22 +71,34 @@ class CellTable {
         }
     }
 
-    /// The points of all cells for which `take(persistence)` is true, by ascending cell: the order depends on the cells
-    /// alone, not on when they came.
+    /// A cell's point, and the key that orders the cells.
+    struct Entry {
+        std::uint64_t key = 0;
+        MapPoint point;
+    };
+    /// The cells for which `take(persistence)` is true, in no order.
     template <class Take>
-    std::vector<MapPoint> sorted(Take take) const {
-        std::vector<const Slot*> taken;
+    std::vector<Entry> entries(Take take) const {
+        std::vector<Entry> taken;
         taken.reserve(size_);
         for (const Slot& slot : slots_) {
-            if (slot.key != kEmpty && take(slot.seen)) taken.push_back(&slot);
+            if (slot.key != kEmpty && take(slot.seen)) taken.push_back({slot.key, slot.point});
         }
-        std::sort(taken.begin(), taken.end(), [](const Slot* a, const Slot* b) { return a->key < b->key; });
-        std::vector<MapPoint> points(taken.size());
-        std::transform(taken.begin(), taken.end(), points.begin(), [](const Slot* slot) { return slot->point; });
+        return taken;
+    }
+    /// Points by ascending cell: the order depends on the cells alone, not on when they came.
+    static std::vector<MapPoint> sorted(std::vector<Entry> entries) {
+        std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.key < b.key; });
+        std::vector<MapPoint> points(entries.size());
+        std::transform(entries.begin(), entries.end(), points.begin(), [](const Entry& e) { return e.point; });
         return points;
     }
+    template <class Take>
+    std::vector<MapPoint> sorted(Take take) const {
+        return sorted(entries(take));
+    }
     std::vector<MapPoint> sorted() const {
-        return sorted([](const Persistence&) { return true; });
+        return sorted(entries([](const Persistence&) { return true; }));
     }
 
   private:

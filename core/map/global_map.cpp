@@ -136,11 +136,11 @@ void GlobalMap::finish() {
     if (s.cells.size() > static_cast<std::size_t>(s.config.max_points)) s.forget_farthest();
 }
 
-std::vector<MapPoint> GlobalMap::points() const {
+std::vector<CellTable::Entry> GlobalMap::snapshot() const {
     const State& s = *state_;
     const double run_ds = static_cast<double>(s.time_ns) / static_cast<double>(kDecisecond_ns);
     const double enough_ds = std::min<double>(s.rule.confirm_ds, kConfirmShareOfRun * run_ds);
-    return s.cells.sorted([&](const Persistence& seen) { return seen.confirmed() || seen.span_ds() >= enough_ds; });
+    return s.cells.entries([&](const Persistence& seen) { return seen.confirmed() || seen.span_ds() >= enough_ds; });
 }
 
 // Every fourth row, another one each time, so that four frames see all; of near surfaces, which fill many pixels of a

@@ -51,7 +51,9 @@ class GlobalMap {
     /// Finishes whatever was postponed; call it before points().
     void finish();
     /// All points, in an order that depends on nothing but the frames.
-    std::vector<MapPoint> points() const;
+    std::vector<MapPoint> points() const { return CellTable::sorted(snapshot()); }
+    /// The same before they are put in order (CellTable::sorted), which takes most of the time and can be done elsewhere.
+    std::vector<CellTable::Entry> snapshot() const;
 
   private:
     struct State;

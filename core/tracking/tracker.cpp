@@ -103,8 +103,8 @@ CandidateDetection candidate(const Detection& detection, const DetectionShape& s
 }  // namespace
 
 struct Tracker::State {
-    State(const SensorModel& sensor, const TrackingConfig& tracking)
-        : config(tracking), shapes(sensor), projection(sensor), merged(sensor) {
+    State(const SensorModel& sensor, const TrackingConfig& tracking, std::uint32_t first_id)
+        : config(tracking), next_id(first_id), shapes(sensor), projection(sensor), merged(sensor) {
         objects.reserve(static_cast<std::size_t>(tracking.max_tracks));
     }
 
@@ -118,7 +118,7 @@ struct Tracker::State {
 
     TrackingConfig config;
     std::vector<TrackedObject> objects;  ///< by ascending id
-    std::uint32_t next_id = 1;
+    std::uint32_t next_id;
     std::int64_t stamp_ns = 0;
     bool started = false;
 
@@ -134,9 +134,13 @@ struct Tracker::State {
     std::vector<std::size_t> parts;  ///< detections of the object at hand
 };
 
-Tracker::Tracker(const SensorModel& sensor, const TrackingConfig& config)
-    : state_(std::make_unique<State>(sensor, config)) {}
+Tracker::Tracker(const SensorModel& sensor, const TrackingConfig& config, std::uint32_t first_id)
+    : state_(std::make_unique<State>(sensor, config, first_id)) {}
 Tracker::~Tracker() = default;
+
+std::uint32_t Tracker::next_id() const {
+    return state_->next_id;
+}
 
 void Tracker::process(Frame& frame) {
     frame.detection.tracks.clear();

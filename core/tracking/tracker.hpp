@@ -15,9 +15,12 @@ namespace dlod {
 /// A frame whose odometry is not valid moves tracks by prediction only.
 class Tracker {
   public:
-    Tracker(const SensorModel& sensor, const TrackingConfig& config);
+    /// @param first_id of the first track; the others count on from it
+    Tracker(const SensorModel& sensor, const TrackingConfig& config, std::uint32_t first_id = 1);
     ~Tracker();
     void process(Frame& frame);
+    /// The id of the next track to be born.
+    std::uint32_t next_id() const;
 
   private:
     struct State;

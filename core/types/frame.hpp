@@ -83,6 +83,7 @@ struct OdometryResult {
         kPredictedOnly = 1U << 2,   ///< too few columns or no convergence: the pose is the prediction
         kReinitialized = 1U << 3,   ///< recovered after it was lost
         kImuFaulty = 1U << 4,       ///< the IMU is there but absurd and is not used
+        kStarted = 1U << 5,         ///< the world frame begins anew: first frame of a run, or after a restart
     };
     bool valid = false;             ///< false: not to be used, not written, published with its flag
     std::uint32_t flags = 0;
@@ -127,6 +128,7 @@ struct DetectionResult {
 };
 
 struct Frame {
+    bool restart = false;  ///< set before the first step: the method begins anew with this frame
     FrameHeader header;
     RawImages raw;
     Columns columns;

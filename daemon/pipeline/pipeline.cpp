@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <chrono>
 #include <cmath>
 #include <system_error>
 #include <utility>
@@ -19,6 +20,8 @@ constexpr std::size_t kSingleThreadFrames = 4;
 constexpr std::size_t kLiveFrames = 13;
 /// Between stages: what is further ahead is only older when its turn comes.
 constexpr std::size_t kQueueLength = 1;
+/// The map stage has nothing to do most of the time.
+constexpr auto kClaimRetry = std::chrono::milliseconds(1);
 
 /// Live: a pose that is older than so many turns of the sensor is of no use to a planner.
 constexpr double kMostLatencyPeriods = 2.0;
@@ -119,12 +122,25 @@ void Pipeline::signal_if_done() {
     [[maybe_unused]] const auto written = ::write(done_descriptor_, &one, sizeof(one));
 }
 
+std::vector<CellTable::Entry> Pipeline::map_snapshot() {
+    while (!map_.try_claim()) std::this_thread::sleep_for(kClaimRetry);
+    auto snapshot = method_.map().snapshot();
+    map_.release();
+    // A worker may have found the stage claimed and gone to sleep.
+    events_.notify();
+    return snapshot;
+}
+
 void Pipeline::prepare(PipelineFrame& frame) {
+    frame.restart = restart_requested_.exchange(false);
     const auto timed = [&](Step step, auto&& work) {
         const StepTimer timer(frame.times, step);
         work();
     };
-    timed(Step::kGeometry, [&] { geometry_.process(frame); });
+    timed(Step::kGeometry, [&] {
+        geometry_.process(frame);
+        options_.body.process(frame);
+    });
     timed(Step::kSubsampling, [&] { method_.subsample(frame); });
     timed(Step::kGround, [&] { method_.remove_ground(frame); });
     timed(Step::kSegmentation, [&] { method_.segment(frame); });
@@ -132,8 +148,7 @@ void Pipeline::prepare(PipelineFrame& frame) {
 
 void Pipeline::estimate_pose(PipelineFrame& frame) {
     const StepTimer timer(frame.times, Step::kOdometry);
-    const std::uint64_t n = odometry_.completed();
-    method_.estimate_pose(frame, n >= kFeedbackDelay ? &feedback_[n % kFeedbackDelay] : nullptr);
+    method_.estimate_pose(frame, feedback_[odometry_.completed() % kFeedbackDelay]);
 }
 
 void Pipeline::detect_and_track(PipelineFrame& frame) {
@@ -161,6 +176,7 @@ void Pipeline::publish(PipelineFrame& frame) {
 void Pipeline::update_map(PipelineFrame& frame) {
     const StepTimer timer(frame.times, Step::kMap);
     method_.update_map(frame);
+    if (frame.restart) restarts_.store(restarts_.load() + 1);
 }
 
 void Pipeline::write(PipelineFrame& frame) {

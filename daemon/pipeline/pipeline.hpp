@@ -8,6 +8,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <functional>
 #include <thread>
 #include <vector>
@@ -16,6 +17,7 @@
 #include "daemon/pipeline/frame_pool.hpp"
 #include "daemon/pipeline/ingest.hpp"
 #include "daemon/pipeline/stage.hpp"
+#include "driver/body_filter.hpp"
 #include "driver/geometry.hpp"
 
 namespace dlod::daemon {
@@ -30,9 +32,10 @@ struct FrameSinks {
 
 struct PipelineOptions {
     int threads = 2;
-    int waiting_frames = 2;  ///< live: more than these are dropped, oldest first; so are those that would be late
-    bool live = false;       ///< receive on a thread of its own, never wait for the stages
-    bool paced = false;      ///< replay in time: the source waits for packets, on a thread of its own
+    int waiting_frames = 2;        ///< live: more than these are dropped, oldest first; so are those that would be late
+    bool live = false;             ///< receive on a thread of its own, never wait for the stages
+    bool paced = false;            ///< replay in time: the source waits for packets, on a thread of its own
+    driver::BodyFilter body = {};  ///< of the robot itself
     std::function<void(int)> on_thread_start = {};  ///< on each thread, with its number; the last one receives
 };
 
@@ -58,6 +61,13 @@ class Pipeline {
 
     /// After done().
     GlobalMap& map() { return method_.map(); }
+    /// The map as it is now, to be put in order by CellTable::sorted. From any thread, at any time; frames are held up
+    /// for no longer than the copy takes.
+    std::vector<CellTable::Entry> map_snapshot();
+    /// Pose, maps and tracks begin anew with the next frame that is prepared. From any thread.
+    void request_restart() { restart_requested_.store(true); }
+    /// Restarts that have gone through all stages. From any thread.
+    std::uint64_t restarts() const { return restarts_.load(); }
 
     const Ingest& ingest() const { return ingest_; }
     std::uint64_t finished_frames() const { return write_.completed(); }
@@ -82,6 +92,8 @@ class Pipeline {
     int done_descriptor_;
     EventCount events_;
     std::array<OdometryFeedback, kFeedbackDelay> feedback_;  ///< of frame n at n % kFeedbackDelay
+    std::atomic<bool> restart_requested_{false};
+    std::atomic<std::uint64_t> restarts_{0};
 
     Admission admission_;
     FramePool pool_;

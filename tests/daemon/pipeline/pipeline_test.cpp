@@ -150,6 +150,52 @@ TEST_F(PipelineTest, WhatASinkThrowsEndsThePipelineAndIsRethrown) {
     EXPECT_EQ(calls, 3);
 }
 
+TEST_F(PipelineTest, ARestartBeginsAnewWithTheNextFrameInEveryStage) {
+    for (const int threads : {1, 3}) {
+        driver::PacedSource source(std::make_unique<driver::PcapSource>(capture_), 0.0);
+        std::vector<std::uint64_t> restarted;
+        std::vector<std::uint64_t> started;
+        Pipeline* running = nullptr;
+        FrameSinks sinks;
+        sinks.publish = [&](PipelineFrame& frame) {
+            if (frame.header.sequence == 9) running->request_restart();
+            if (frame.restart) restarted.push_back(frame.header.sequence);
+            if ((frame.odometry.flags & OdometryResult::kStarted) == 0) return;
+            started.push_back(frame.header.sequence);
+            EXPECT_LT(frame.odometry.T_world_sensor.translation().norm(), 0.2) << "the world begins here";
+        };
+        Pipeline pipeline(sensor_, {}, {}, source, std::move(sinks), {.threads = threads});
+        running = &pipeline;
+        pipeline.start();
+        wait_until_done(pipeline);
+        pipeline.rethrow_failure();
+        ASSERT_EQ(restarted.size(), 1U);
+        EXPECT_GE(restarted[0], 10U);
+        EXPECT_LE(restarted[0], 18U) << "not later than the next frame to be prepared";
+        EXPECT_EQ(started, (std::vector<std::uint64_t>{0, restarted[0]}));
+        EXPECT_EQ(pipeline.restarts(), 1U);
+    }
+}
+
+TEST_F(PipelineTest, TheMapCanBeCopiedAtAnyTime) {
+    driver::PacedSource source(std::make_unique<driver::PcapSource>(capture_), 0.0);
+    std::vector<std::size_t> sizes;
+    Pipeline* running = nullptr;
+    FrameSinks sinks;
+    sinks.write = [&](PipelineFrame& frame) {
+        if (frame.header.sequence % 6 == 0) sizes.push_back(running->map_snapshot().size());
+    };
+    Pipeline pipeline(sensor_, {}, {}, source, std::move(sinks), {.threads = 3});
+    running = &pipeline;
+    EXPECT_TRUE(pipeline.map_snapshot().empty()) << "before the first frame";
+    pipeline.start();
+    wait_until_done(pipeline);
+    pipeline.rethrow_failure();
+    ASSERT_EQ(sizes.size(), 5U);
+    EXPECT_GT(sizes.back(), 100U);
+    EXPECT_EQ(pipeline.map_snapshot().size(), pipeline.map().points().size());
+}
+
 TEST_F(PipelineTest, StoppingKeepsWhatWasReceived) {
     driver::PacedSource source(std::make_unique<driver::PcapSource>(capture_), 1.0);
     std::vector<std::uint64_t> written;
