@@ -1,7 +1,9 @@
 // Command line of dlod.
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <dlod/command_t.hpp>
 #include <exception>
+#include <map>
 
 #include "daemon/commands/commands.hpp"
 #include "daemon/config/option.hpp"
@@ -78,6 +80,25 @@ int main(int argc, char** argv) {
                      "0: as fast as possible (default), 1: true rate, 2: twice as fast, ...")
         ->check(CLI::Range(0.0, 1000.0));
 
+    SendArguments send_arguments;
+    auto* send_command_line =
+        app.add_subcommand("command", "tell a running dlod to do something, and print its answer");
+    const std::map<std::string, int> commands = {{"save-map", dlod::command_t::SAVE_MAP},
+                                                         {"restart-odometry", dlod::command_t::RESTART_ODOMETRY},
+                                                         {"log-level", dlod::command_t::SET_LOG_LEVEL}};
+    send_command_line
+        ->add_option("COMMAND", send_arguments.command,
+                     "save-map [NAME]: NAME.pcd and NAME.ply in saved_maps.folder, by default named by the time; "
+                     "restart-odometry: pose, map and tracks begin anew; log-level LEVEL: trace, debug, info, warning, "
+                     "error or off")
+        ->required()
+        ->transform(CLI::CheckedTransformer(commands));
+    send_command_line->add_option("ARGUMENT", send_arguments.argument, "of the command");
+    send_command_line->add_option("--timeout", send_arguments.timeout_s, "seconds to wait for the answer; default: 15")
+        ->check(CLI::Range(0.1, 3600.0));
+    add_config_options(*send_command_line, send_arguments.config);
+    add_setting(*send_command_line, "--lcm", "lcm.url", send_arguments.config.settings, "LCM provider");
+
     ConfigSources doctored;
     auto* doctor_command = app.add_subcommand("doctor", "check this machine and say how to mend what is wrong");
     add_config_options(*doctor_command, doctored);
@@ -111,6 +132,7 @@ int main(int argc, char** argv) {
         ExitCode code = ExitCode::kSuccess;
         if (*run_command) code = run(run_arguments);
         if (*replay_command) code = replay(replay_arguments);
+        if (*send_command_line) code = send_command(send_arguments);
         if (*doctor_command) code = doctor(doctored);
         if (*info_command) code = info(info_file, info_metadata);
         if (*check_command) code = check_config(checked, checked_metadata);

@@ -27,7 +27,7 @@ endfunction()
 
 file(MAKE_DIRECTORY ${man_dir})
 dlod_add_man_page(dlod dlod "dynamic LiDAR odometry daemon" dlod)
-foreach(command run replay doctor info check-config print-config)
+foreach(command run replay command doctor info check-config print-config)
   dlod_add_man_page(dlod-${command} dlod "dynamic LiDAR odometry: ${command}" see_also ${command})
 endforeach()
 if(DLOD_BUILD_TOOLS)

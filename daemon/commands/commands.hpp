@@ -28,8 +28,17 @@ struct RunArguments {
     ConfigSources config;
 };
 
+struct SendArguments {
+    int command = 0;  ///< one of command_t's constants
+    std::string argument;
+    double timeout_s = 15.0;
+    ConfigSources config;  ///< for lcm.url and lcm.channel_prefix
+};
+
 ExitCode replay(const ReplayArguments& arguments);
 ExitCode run(const RunArguments& arguments);
+/// Tells a running dlod to do something and prints its answer; fails where it could not do it.
+ExitCode send_command(const SendArguments& arguments);
 /// Checks the machine for what the configuration needs; fails where dlod could not do its job.
 ExitCode doctor(const ConfigSources& config);
 /// Sensor, profile, packets, frames, losses and duration of a capture; of a metadata file the sensor alone.

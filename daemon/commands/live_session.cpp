@@ -14,22 +14,19 @@
 namespace dlod::daemon {
 namespace {
 
-std::string describe(const driver::SensorInfo& sensor) {
-    return fmt::format("{} {} {} {} {}", sensor.product_line, sensor.serial_number, sensor.firmware, sensor.lidar_mode,
-                       sensor.profile_name);
-}
-
-PipelineOptions pipeline_options(const PipelineConfig& config) {
-    return {.threads = config.threads,
-            .waiting_frames = config.waiting_frames,
+PipelineOptions pipeline_options(const Config& config) {
+    return {.threads = config.pipeline.threads,
+            .waiting_frames = config.pipeline.waiting_frames,
             .live = true,
-            .on_thread_start = [config](int i) {
-                set_up_thread(i < config.threads ? fmt::format("dlod-{}", i).c_str() : "dlod-receive", config);
+            .body = {config.extrinsics.T_base_sensor(), config.robot_body.boxes()},
+            .on_thread_start = [pipeline = config.pipeline](int i) {
+                set_up_thread(i < pipeline.threads ? fmt::format("dlod-{}", i).c_str() : "dlod-receive", pipeline);
             }};
 }
 
-std::unique_ptr<LcmBus> make_bus(const LcmConfig& config) {
-    return config.url == "none" ? nullptr : std::make_unique<LcmBus>(config.url);
+std::unique_ptr<SessionMessages> make_messages(const Config& config, const driver::SensorInfo& sensor) {
+    if (config.lcm.url == "none") return nullptr;
+    return std::make_unique<SessionMessages>(config.lcm, sensor, config.extrinsics.T_base_sensor());
 }
 
 /// Each session has a folder of its own: one that another sensor ended keeps its results.
@@ -56,19 +53,16 @@ LiveSession::LiveSession(const Config& config, const driver::SensorInfo& sensor,
                          const LiveStart& start)
     : config_(config),
       utime_source_(config.lcm.utime_source),
-      description_(describe(sensor)),
+      description_(sensor.description()),
       start_(start),
       socket_(udp_options(config.sensor, sensor)),
       recording_(socket_, config.recording, metadata),
-      bus_(make_bus(config.lcm)),
-      publisher_(bus_ ? std::make_unique<FramePublisher>(*bus_, sensor.model, config.extrinsics.T_base_sensor(),
-                                                         config.lcm.channel_prefix)
-                      : nullptr),
-      status_sender_(bus_ ? std::make_unique<MessageSender>(*bus_) : nullptr),
+      messages_(make_messages(config, sensor)),
+      maps_(config.saved_maps),
       writer_(make_writer(config.output, start.sessions_before)),
       host_time_(start.host_time),
       board_(DLOD_VERSION, description_, start.start_ns),
-      pipeline_(sensor, config.method, config.frames, recording_, sinks(), pipeline_options(config.pipeline)) {}
+      pipeline_(sensor, config.method, config.frames, recording_, sinks(), pipeline_options(config)) {}
 
 FrameSinks LiveSession::sinks() {
     return {.publish = [this](PipelineFrame& frame) { publish(frame); },
@@ -79,17 +73,22 @@ FrameSinks LiveSession::sinks() {
 void LiveSession::start() {
     lock_memory(config_.pipeline);
     pipeline_.start();
+    if (messages_) {
+        messages_->announce_sensor(monotonic_ns(), StepTimer::now_ns(CLOCK_REALTIME) / 1000);
+        if (config_.lcm.commands && CommandListener::can_listen(config_.lcm.url))
+            control_ = std::make_unique<RemoteControl>(config_.lcm, maps_, pipeline_, board_, messages_->bus());
+    }
     service_.ready("waiting for packets");
     spdlog::info("receiving on port {}, {}", fmt::join(socket_.ports(), " and "), description_);
 }
 
 void LiveSession::publish(const PipelineFrame& frame) {
-    if (!publisher_) return;
+    if (!messages_) return;
     host_time_.add(frame.header.stamp_ns, frame.header.receive_ns);
     report_clock_step();
     const bool sensor_time = utime_source_.load(std::memory_order_relaxed) == 1;
     const std::int64_t stamp_ns = sensor_time ? frame.header.stamp_ns : host_time_.next_stamp_ns(frame.header.stamp_ns);
-    publisher_->publish(frame, stamp_ns / 1000);
+    messages_->publish(frame, stamp_ns / 1000);
 }
 
 void LiveSession::report_clock_step() {
@@ -113,6 +112,12 @@ void LiveSession::write(PipelineFrame& frame) {
     }
 }
 
+/// A map that cannot be saved does not make the stop unclean.
+void LiveSession::save_last_map() {
+    const auto result = maps_.save("last", pipeline_.map().snapshot());
+    spdlog::log(result.ok ? spdlog::level::info : spdlog::level::err, "map at the stop: {}", result.text);
+}
+
 CounterList LiveSession::counters() {
     CounterList counters;
     const driver::CounterVisitor collect = [&](std::string_view name, std::uint64_t value) {
@@ -121,7 +126,9 @@ CounterList LiveSession::counters() {
     recording_.visit_counters(collect);
     pipeline_.ingest().counters().visit(collect);
     collect("pipeline_dropped_frames", pipeline_.dropped_frames());
-    if (publisher_) collect("lcm_failed", publisher_->failed() + status_sender_->failed());
+    if (messages_) collect("lcm_failed", messages_->failed());
+    if (control_) control_->visit_counters(collect);
+    collect("restarts_of_odometry", pipeline_.restarts());
     collect("output_failures", output_failures_.value());
     collect("sensor_changes", start_.sessions_before);
     return counters;
@@ -130,10 +137,13 @@ CounterList LiveSession::counters() {
 void LiveSession::report(const std::string& sensor_trouble) {
     const CounterList totals = counters();
     const std::int64_t now_ns = monotonic_ns();
+    const std::int64_t utime = StepTimer::now_ns(CLOCK_REALTIME) / 1000;
     board_.set_sensor_trouble(sensor_trouble);
-    const auto& status =
-        board_.compose(totals, pipeline_.ingest().last_packet_ns(), now_ns, StepTimer::now_ns(CLOCK_REALTIME) / 1000);
-    if (status_sender_) status_sender_->send(config_.lcm.channel_prefix + "STATUS", status);
+    const status_t status = board_.compose(totals, pipeline_.ingest().last_packet_ns(), now_ns, utime);
+    if (messages_) {
+        messages_->announce_sensor(now_ns, utime);
+        messages_->send(status);
+    }
     service_.status(board_.one_line());
     log_health(status);
     judge_stream(totals, now_ns);
@@ -178,11 +188,11 @@ void LiveSession::log_health(const status_t& status) {
 }
 
 void LiveSession::finish() {
+    control_.reset();
     pipeline_.rethrow_failure();
-    if (writer_) {
-        pipeline_.map().finish();
-        writer_->finish(pipeline_.map().points());
-    }
+    if (writer_ || config_.saved_maps.at_stop) pipeline_.map().finish();
+    if (config_.saved_maps.at_stop) save_last_map();
+    if (writer_) writer_->finish(pipeline_.map().points());
     spdlog::info("stopped after {} frames, {} dropped", pipeline_.finished_frames(), pipeline_.dropped_frames());
 }
 

@@ -8,10 +8,11 @@
 
 #include "daemon/clock/host_time_filter.hpp"
 #include "daemon/config/config.hpp"
+#include "daemon/control/remote_control.hpp"
+#include "daemon/output/map_store.hpp"
 #include "daemon/output/result_writer.hpp"
 #include "daemon/pipeline/pipeline.hpp"
-#include "daemon/publish/frame_publisher.hpp"
-#include "daemon/publish/lcm_bus.hpp"
+#include "daemon/publish/session_messages.hpp"
 #include "daemon/recorder/recording_source.hpp"
 #include "daemon/sensor/sensor_watch.hpp"
 #include "daemon/service/log.hpp"
@@ -57,6 +58,7 @@ class LiveSession {
     FrameSinks sinks();
     void publish(const PipelineFrame& frame);
     void write(PipelineFrame& frame);
+    void save_last_map();
     CounterList counters();
     void report_clock_step();
     void log_health(const status_t& status);
@@ -68,9 +70,8 @@ class LiveSession {
     LiveStart start_;
     driver::UdpSource socket_;
     RecordingSource recording_;
-    std::unique_ptr<LcmBus> bus_;
-    std::unique_ptr<FramePublisher> publisher_;
-    std::unique_ptr<MessageSender> status_sender_;
+    std::unique_ptr<SessionMessages> messages_;
+    MapStore maps_;
     std::unique_ptr<ResultWriter> writer_;
     HostTimeFilter host_time_;
     SensorWatch::Stream stream_ = SensorWatch::Stream::kSilent;
@@ -80,7 +81,8 @@ class LiveSession {
     ServiceNotifier service_;
     driver::Counter output_failures_;
     std::int8_t last_health_ = status_t::WAITING;
-    Pipeline pipeline_;  // last: its threads use all of the above
+    Pipeline pipeline_;                       // its threads use all of the above
+    std::unique_ptr<RemoteControl> control_;  // last: its thread uses the pipeline
 };
 
 }  // namespace dlod::daemon

@@ -9,10 +9,9 @@
 #include "daemon/commands/capture_metadata.hpp"
 #include "daemon/commands/commands.hpp"
 #include "daemon/commands/load_config.hpp"
+#include "daemon/commands/replay_messages.hpp"
 #include "daemon/output/result_writer.hpp"
 #include "daemon/pipeline/pipeline.hpp"
-#include "daemon/publish/frame_publisher.hpp"
-#include "daemon/publish/lcm_bus.hpp"
 #include "daemon/service/log.hpp"
 #include "daemon/service/signals.hpp"
 #include "driver/paced_source.hpp"
@@ -119,38 +118,45 @@ ExitCode replay(const ReplayArguments& arguments) {
         writer = std::make_unique<ResultWriter>(config.output.folder, static_cast<TimingClock>(config.output.timing));
     }
 
-    std::unique_ptr<LcmBus> bus;
-    std::unique_ptr<FramePublisher> publisher;
+    std::unique_ptr<ReplayMessages> messages;
     if (!config.lcm.url.empty() && config.lcm.url != "none") {
-        bus = std::make_unique<LcmBus>(config.lcm.url);
-        publisher = std::make_unique<FramePublisher>(*bus, sensor.model, config.extrinsics.T_base_sensor(),
-                                                     config.lcm.channel_prefix);
+        messages = std::make_unique<ReplayMessages>(config, sensor);
     }
 
     Summary summary;
     FrameSinks sinks;
-    if (publisher)
-        sinks.publish = [&](PipelineFrame& frame) { publisher->publish(frame, frame.header.stamp_ns / 1000); };
+    if (messages) sinks.publish = [&](PipelineFrame& frame) { messages->publish(frame); };
     if (writer) sinks.write = [&](PipelineFrame& frame) { writer->write(frame); };
-    sinks.finished = [&](const PipelineFrame& frame) { summary.add(frame); };
+    sinks.finished = [&](const PipelineFrame& frame) {
+        summary.add(frame);
+        if (messages) messages->add(frame);
+    };
     SignalWaiter signals;
     const auto start = Clock::now();
     const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
     Pipeline pipeline(sensor, config.method, config.frames, source, std::move(sinks),
-                      {.threads = config.pipeline.threads, .paced = arguments.rate > 0.0});
+                      {.threads = config.pipeline.threads,
+                       .paced = arguments.rate > 0.0,
+                       .body = {config.extrinsics.T_base_sensor(), config.robot_body.boxes()}});
     pipeline.start();
+    if (messages) messages->listen(pipeline);
 
     ProgressBar progress;
     bool interrupted = false;
     while (!pipeline.done()) {
         const auto event = signals.wait(pipeline.done_descriptor(), std::chrono::milliseconds(200));
         progress.show(progress_of.progress(), pipeline.finished_frames(), elapsed());
+        if (messages) messages->report_if_due(pipeline, source);
         if (event == SignalWaiter::Event::kStop) {
             interrupted = true;
             pipeline.stop();
         }
     }
     progress.finish();
+    if (messages) {
+        messages->stop_listening();
+        messages->report(pipeline, source);
+    }
     pipeline.rethrow_failure();
     if (writer) {
         pipeline.map().finish();

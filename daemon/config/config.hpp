@@ -6,7 +6,10 @@
 #include <vector>
 
 #include "core/method_config.hpp"
+#include "daemon/output/map_store.hpp"
+#include "daemon/publish/message_config.hpp"
 #include "daemon/recorder/recording_config.hpp"
+#include "driver/body_filter.hpp"
 #include "driver/frame_builder.hpp"
 
 namespace dlod::daemon {
@@ -85,6 +88,27 @@ struct ExtrinsicsConfig {
     }
 };
 
+/// The robot's own body in the sensor's view.
+struct RobotBodyConfig {
+    std::vector<double> boxes_m;
+
+    /// Six numbers of boxes_m each.
+    std::vector<driver::BodyBox> boxes() const {
+        std::vector<driver::BodyBox> boxes;
+        for (std::size_t i = 0; i + 6 <= boxes_m.size(); i += 6) {
+            boxes.push_back({Eigen::Vector3d::Map(&boxes_m[i]), Eigen::Vector3d::Map(&boxes_m[i + 3])});
+        }
+        return boxes;
+    }
+
+    template <class V>
+    void visit(V& v) {
+        v.list_of("boxes_m", boxes_m, Range{-100.0, 100.0}, "m",
+                  "boxes in the base frame in which returns are none, six numbers each: lowest x, y, z, highest x, y, "
+                  "z");
+    }
+};
+
 struct PipelineConfig {
     int threads = 2;
     int waiting_frames = 2;
@@ -103,22 +127,6 @@ struct PipelineConfig {
         v.parameter("realtime_priority", realtime_priority, Range{0, 99}, "1",
                     "SCHED_FIFO priority of a live run's threads; 0: ordinary scheduling");
         v.flag("lock_memory", lock_memory, "keep a live run's memory from being paged out");
-    }
-};
-
-struct LcmConfig {
-    std::string url;
-    std::string channel_prefix = "DLOD_";
-    int utime_source = 0;
-
-    template <class V>
-    void visit(V& v) {
-        v.text("url", url,
-               "LCM provider, say udpm://239.255.76.67:7667?ttl=1; none: publish nothing; empty: none in replay, LCM's "
-               "default live");
-        v.text("channel_prefix", channel_prefix, "put before POSE, MASK, TRACKS and STATUS");
-        v.choice("utime_source", utime_source, {"host", "sensor"},
-                 "host: utime is host time (UTC) when live; sensor: the packets' own time");
     }
 };
 
@@ -147,10 +155,12 @@ struct LogConfig {
 struct Config {
     SensorConfig sensor;
     ExtrinsicsConfig extrinsics;
+    RobotBodyConfig robot_body;
     driver::FrameBuilderConfig frames;
     PipelineConfig pipeline;
     LcmConfig lcm;
     OutputConfig output;
+    MapStoreConfig saved_maps;
     RecordingConfig recording;
     LogConfig log;
     MethodConfig method;
@@ -160,10 +170,12 @@ struct Config {
     void visit(V& v) {
         v.group("sensor", sensor, "where packets come from");
         v.group("extrinsics", extrinsics, "where the sensor sits on the robot: T_base_sensor");
+        v.group("robot_body", robot_body, "the robot itself, which the sensor sees");
         v.group("frames", frames, "assembly of packets to frames");
         v.group("pipeline", pipeline, "threads");
         v.group("lcm", lcm, "messages");
         v.group("output", output, "result files");
+        v.group("saved_maps", saved_maps, "maps that are kept");
         v.group("recording", recording, "captures of a live run");
         v.group("log", log, "log messages");
         method.visit(v);

@@ -104,6 +104,24 @@ std::string comment(const std::string& text, const std::string& indent) {
     return out + line + '\n';
 }
 
+void check_robot_body(const RobotBodyConfig& body) {
+    if (body.boxes_m.size() % 6 != 0) {
+        throw ConfigError(
+            fmt::format("robot_body.boxes_m: it has {} numbers; a box has six: lowest x, y, z, highest "
+                        "x, y, z",
+                        body.boxes_m.size()));
+    }
+    const auto boxes = body.boxes();
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+        if (!(boxes[i].low_m.array() < boxes[i].high_m.array()).all()) {
+            throw ConfigError(
+                fmt::format("robot_body.boxes_m: box {}: its lowest corner must lie below its highest "
+                            "one in x, y and z",
+                            i + 1));
+        }
+    }
+}
+
 }  // namespace
 
 void apply_yaml(Config& config, const std::string& yaml, const std::string& name) {
@@ -156,6 +174,11 @@ void check_consistency(const Config& config) {
     }
     if (config.sensor.lidar_port != 0 && config.sensor.lidar_port == config.sensor.imu_port) {
         throw ConfigError("sensor.imu_port: must differ from sensor.lidar_port");
+    }
+    check_robot_body(config.robot_body);
+    const auto& obstacles = config.lcm.obstacles;
+    if (obstacles.min_height_m >= obstacles.max_height_m) {
+        throw ConfigError("lcm.obstacles.min_height_m: must be below lcm.obstacles.max_height_m");
     }
 }
 

@@ -17,15 +17,25 @@ constexpr std::size_t kBufferBytes = 64 * 1024;
     throw OutputError(fmt::format("{}: cannot {}: {}", path.string(), what, std::strerror(error)));
 }
 
+std::filesystem::path path_to_write(const std::filesystem::path& target, OutputFile::Mode mode) {
+    return mode == OutputFile::Mode::kInPlace ? target : std::filesystem::path(target.string() + ".part");
+}
+
 }  // namespace
 
-OutputFile::OutputFile(std::filesystem::path path)
-    : path_(std::move(path)), descriptor_(::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644)) {
+OutputFile::OutputFile(std::filesystem::path path, Mode mode)
+    : target_(std::move(path)),
+      path_(path_to_write(target_, mode)),
+      descriptor_(::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644)) {
     if (descriptor_ < 0) fail(path_, "create the file", errno);
     buffer_.reserve(kBufferBytes);
 }
 
 OutputFile::~OutputFile() {
+    if (path_ != target_ && descriptor_ >= 0) {
+        ::close(std::exchange(descriptor_, -1));
+        ::unlink(path_.c_str());
+    }
     try {
         close();
     } catch (const OutputError&) {
@@ -59,16 +69,31 @@ void OutputFile::write_through(std::span<const std::byte> bytes) {
 void OutputFile::close() {
     if (descriptor_ < 0) return;
     struct Closer {
-        int& descriptor;
+        OutputFile& file;
+        bool done = false;
         ~Closer() {
-            if (descriptor >= 0) ::close(descriptor);
-            descriptor = -1;
+            if (file.descriptor_ >= 0) ::close(file.descriptor_);
+            file.descriptor_ = -1;
+            if (!done && file.path_ != file.target_) ::unlink(file.path_.c_str());
         }
-    } closer{descriptor_};
+    } closer{*this};
     flush();
+    if (path_ != target_ && ::fsync(descriptor_) != 0) fail(path_, "write to the disk", errno);
     // Network and quota file systems report a lack of space only here.
     const int descriptor = std::exchange(descriptor_, -1);
     if (::close(descriptor) != 0 && errno != EINTR) fail(path_, "close", errno);
+    if (path_ != target_) put_in_place();
+    closer.done = true;
+}
+
+void OutputFile::put_in_place() {
+    if (::rename(path_.c_str(), target_.c_str()) != 0) fail(target_, "replace the file", errno);
+    // The new name, too, is to outlive a loss of power. Where the folder cannot be opened the system sees to it in
+    // time.
+    const int folder = ::open(target_.parent_path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (folder < 0) return;
+    ::fsync(folder);
+    ::close(folder);
 }
 
 }  // namespace dlod::daemon

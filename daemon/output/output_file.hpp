@@ -18,8 +18,15 @@ class OutputError : public std::runtime_error {
 
 class OutputFile {
   public:
+    enum class Mode {
+        kInPlace,
+        /// What was there stays until close() has put the new file, complete and on the disk, in its place; without
+        /// close() it stays for good.
+        kReplace,
+    };
+
     /// Creates or truncates. @throws OutputError
-    explicit OutputFile(std::filesystem::path path);
+    explicit OutputFile(std::filesystem::path path, Mode mode = Mode::kInPlace);
     ~OutputFile();
     OutputFile(const OutputFile&) = delete;
     OutputFile& operator=(const OutputFile&) = delete;
@@ -27,15 +34,18 @@ class OutputFile {
     /// @throws OutputError
     void write(std::string_view text) { write(std::as_bytes(std::span(text))); }
     void write(std::span<const std::byte> bytes);
-    /// Hands everything to the system and closes. Without it the destructor does so, but cannot report a failure.
+    /// Hands everything to the system and closes. Without it the destructor does so in place, but cannot report a
+    /// failure.
     /// @throws OutputError
     void close();
 
   private:
     void flush();
     void write_through(std::span<const std::byte> bytes);
+    void put_in_place();
 
-    std::filesystem::path path_;
+    std::filesystem::path target_;
+    std::filesystem::path path_;  ///< what is written: the target, or a file beside it that will replace it
     int descriptor_;
     std::vector<std::byte> buffer_;
 };

@@ -6,8 +6,6 @@
 #include <bit>
 #include <cmath>
 
-#include "daemon/output/output_file.hpp"
-
 namespace dlod::daemon {
 namespace {
 
@@ -17,20 +15,33 @@ bool is_finite(const MapPoint& p) {
     return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
 }
 
+std::ptrdiff_t count_finite(std::span<const MapPoint> points) {
+    return std::count_if(points.begin(), points.end(), is_finite);
+}
+
+void write_finite(OutputFile& file, std::span<const MapPoint> points) {
+    for (const auto& point : points) {
+        if (is_finite(point)) file.write(std::as_bytes(std::span(&point, 1)));
+    }
+}
+
 }  // namespace
 
-void write_pcd(const std::filesystem::path& path, std::span<const MapPoint> points) {
-    const auto count = std::count_if(points.begin(), points.end(), is_finite);
-    OutputFile file(path);
+void write_pcd(OutputFile& file, std::span<const MapPoint> points) {
     file.write(
         fmt::format("# .PCD v0.7 - Point Cloud Data file format\n"
                     "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {0}\nHEIGHT 1\n"
                     "VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {0}\nDATA binary\n",
-                    count));
-    for (const auto& point : points) {
-        if (is_finite(point)) file.write(std::as_bytes(std::span(&point, 1)));
-    }
-    file.close();
+                    count_finite(points)));
+    write_finite(file, points);
+}
+
+void write_ply(OutputFile& file, std::span<const MapPoint> points) {
+    file.write(
+        fmt::format("ply\nformat binary_little_endian 1.0\ncomment metres, z up\nelement vertex {}\n"
+                    "property float x\nproperty float y\nproperty float z\nend_header\n",
+                    count_finite(points)));
+    write_finite(file, points);
 }
 
 }  // namespace dlod::daemon

@@ -1,15 +1,19 @@
+// Points as files that other programs read.
 #pragma once
 
-#include <filesystem>
 #include <span>
 
-#include "core/map/global_map.hpp"
+#include "core/map/cell_table.hpp"
+#include "daemon/output/output_file.hpp"
 
 namespace dlod::daemon {
 
-/// Writes points as PCD 0.7, DATA binary, fields x y z (float32, metres); points that are not finite are left out.
-/// Our own dozen lines: PCL's writer would load VTK into the daemon.
+// Our own dozen lines each: PCL's writers would load VTK into the daemon. Points that are not finite are left out.
+
+/// Writes points as PCD 0.7, DATA binary, fields x y z (float32, metres). @throws OutputError
+void write_pcd(OutputFile& file, std::span<const MapPoint> points);
+/// Writes points as PLY 1.0, binary little-endian, properties x y z (float32, metres).
 /// @throws OutputError
-void write_pcd(const std::filesystem::path& path, std::span<const MapPoint> points);
+void write_ply(OutputFile& file, std::span<const MapPoint> points);
 
 }  // namespace dlod::daemon

@@ -1,6 +1,8 @@
 #include "daemon/output/result_writer.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <initializer_list>
 #include <iterator>
 
 #include "daemon/output/point_cloud_file.hpp"
@@ -31,6 +33,15 @@ const char* state_name(DynamicState state) {
 template <class T>
 std::span<const std::byte> bytes_of(const Image<T>& image) {
     return std::as_bytes(std::span(image.data(), image.size()));
+}
+
+/// Appends the separator and the value, for each; what rounds to zero has no sign.
+void append_fixed(fmt::memory_buffer& line, char separator, int decimals, std::initializer_list<double> values) {
+    const double half_of_last = 0.5 * std::pow(10.0, -decimals);
+    for (const double value : values) {
+        fmt::format_to(std::back_inserter(line), "{}{:.{}f}", separator, std::abs(value) <= half_of_last ? 0.0 : value,
+                       decimals);
+    }
 }
 
 std::string_view text_of(const fmt::memory_buffer& buffer) {
@@ -68,9 +79,10 @@ void ResultWriter::write_pose(const Frame& frame) {
     const Eigen::Vector3d t = frame.odometry.T_world_sensor.translation();
     const Eigen::Quaterniond q(frame.odometry.T_world_sensor.linear());
     line_.clear();
-    fmt::format_to(std::back_inserter(line_), "{}.{:09} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n",
-                   frame.header.stamp_ns / 1'000'000'000, frame.header.stamp_ns % 1'000'000'000, t.x(), t.y(), t.z(),
-                   q.x(), q.y(), q.z(), q.w());
+    fmt::format_to(std::back_inserter(line_), "{}.{:09}", frame.header.stamp_ns / 1'000'000'000,
+                   frame.header.stamp_ns % 1'000'000'000);
+    append_fixed(line_, ' ', 9, {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()});
+    line_.push_back('\n');
     trajectory_.write(text_of(line_));
 }
 
@@ -78,13 +90,14 @@ void ResultWriter::write_tracks(const Frame& frame) {
     line_.clear();
     for (const Track& track : frame.detection.tracks) {
         const auto& box = track.box;
-        fmt::format_to(
-            std::back_inserter(line_),
-            "{},{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{},{},{:.6f}\n",
-            frame.header.sequence, frame.header.stamp_ns, track.id, state_name(track.state), box.center_m.x(),
-            box.center_m.y(), box.center_m.z(), box.yaw_rad, box.size_m.x(), box.size_m.y(), box.size_m.z(),
-            track.velocity_mps.x(), track.velocity_mps.y(), track.velocity_mps.z(), track.points, track.hits,
-            track.residual_m);
+        fmt::format_to(std::back_inserter(line_), "{},{},{},{}", frame.header.sequence, frame.header.stamp_ns, track.id,
+                       state_name(track.state));
+        append_fixed(line_, ',', 6,
+                     {box.center_m.x(), box.center_m.y(), box.center_m.z(), box.yaw_rad, box.size_m.x(), box.size_m.y(),
+                      box.size_m.z(), track.velocity_mps.x(), track.velocity_mps.y(), track.velocity_mps.z()});
+        fmt::format_to(std::back_inserter(line_), ",{},{}", track.points, track.hits);
+        append_fixed(line_, ',', 6, {track.residual_m});
+        line_.push_back('\n');
     }
     tracks_.write(text_of(line_));
 }
@@ -108,7 +121,9 @@ void ResultWriter::write_row(const PipelineFrame& frame) {
 
 void ResultWriter::finish(std::span<const MapPoint> map) {
     for (OutputFile* file : {&trajectory_, &frames_, &labels_, &instances_, &tracks_}) file->close();
-    write_pcd(folder_ / "map.pcd", map);
+    OutputFile map_file(folder_ / "map.pcd");
+    write_pcd(map_file, map);
+    map_file.close();
 }
 
 }  // namespace dlod::daemon

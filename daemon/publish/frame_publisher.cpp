@@ -31,9 +31,20 @@ std::size_t tracks_that_fit(std::size_t room) {
     return (room - encoded_size(none)) / (encoded_size(one) - encoded_size(none));
 }
 
+std::size_t obstacles_that_fit(std::size_t room) {
+    const obstacles_t none{};
+    obstacles_t one{};
+    one.count = 1;
+    one.x = one.y = one.z = {0};
+    one.track = {0};
+    one.flags = {0};
+    return (room - encoded_size(none)) / (encoded_size(one) - encoded_size(none));
+}
+
 std::int32_t flags_of(const OdometryResult& odometry) {
     static_assert(pose_t::IMU_USED == 2 * OdometryResult::kImuUsed &&
-                  pose_t::IMU_FAULTY == 2 * OdometryResult::kImuFaulty);
+                  pose_t::IMU_FAULTY == 2 * OdometryResult::kImuFaulty &&
+                  pose_t::RESTARTED == 2 * OdometryResult::kStarted);
     // The message's flags are the odometry's, moved up by one bit for VALID.
     return static_cast<std::int32_t>(odometry.flags << 1U) | (odometry.valid ? pose_t::VALID : 0);
 }
@@ -71,14 +82,19 @@ BaseMotion base_motion(const OdometryResult& odometry, const Eigen::Isometry3d& 
 }
 
 FramePublisher::FramePublisher(MessageBus& bus, const SensorModel& sensor, const Eigen::Isometry3d& T_base_sensor,
-                               const std::string& channel_prefix)
+                               const LcmConfig& config)
     : sender_(bus),
       T_base_sensor_(T_base_sensor),
-      pose_channel_(channel_prefix + "POSE"),
-      mask_channel_(channel_prefix + "MASK"),
-      tracks_channel_(channel_prefix + "TRACKS"),
+      pose_channel_(config.channel_prefix + "POSE"),
+      mask_channel_(config.channel_prefix + "MASK"),
+      tracks_channel_(config.channel_prefix + "TRACKS"),
+      obstacles_channel_(config.channel_prefix + "OBSTACLES"),
+      bot_core_channel_(config.bot_core_channel),
       rows_per_part_(rows_that_fit(sensor, room_for(mask_channel_))),
-      max_tracks_(tracks_that_fit(room_for(tracks_channel_))) {
+      max_tracks_(tracks_that_fit(room_for(tracks_channel_))),
+      obstacles_every_(static_cast<std::uint64_t>(config.obstacles.every_frames)) {
+    if (obstacles_every_ > 0)
+        obstacles_.emplace(sensor, config.obstacles, obstacles_that_fit(room_for(obstacles_channel_)));
     const auto plane_bytes = (static_cast<std::size_t>(rows_per_part_ * sensor.width) + 7) / 8;
     mask_.dynamic.reserve(plane_bytes);
     mask_.undecided.reserve(plane_bytes);
@@ -86,13 +102,16 @@ FramePublisher::FramePublisher(MessageBus& bus, const SensorModel& sensor, const
 }
 
 void FramePublisher::publish(const Frame& frame, std::int64_t utime) {
-    publish_pose(frame, utime);
+    const BaseMotion motion = base_motion(frame.odometry, T_base_sensor_);
+    publish_pose(frame, motion, utime);
     publish_mask(frame, utime);
     publish_tracks(frame, utime);
+    if (!frame.odometry.valid) return;
+    if (!bot_core_channel_.empty()) publish_bot_core_pose(motion, utime);
+    if (obstacles_) publish_obstacles(frame, motion, utime);
 }
 
-void FramePublisher::publish_pose(const Frame& frame, std::int64_t utime) {
-    const BaseMotion motion = base_motion(frame.odometry, T_base_sensor_);
+void FramePublisher::publish_pose(const Frame& frame, const BaseMotion& motion, std::int64_t utime) {
     const Eigen::Quaterniond q(motion.T_odom_base.linear());
     pose_.utime = utime;
     pose_.sequence = static_cast<std::int64_t>(frame.header.sequence);
@@ -103,6 +122,16 @@ void FramePublisher::publish_pose(const Frame& frame, std::int64_t utime) {
     Matrix6d::Map(pose_.covariance) = motion.covariance;
     pose_.flags = flags_of(frame.odometry);
     sender_.send(pose_channel_, pose_);
+}
+
+void FramePublisher::publish_bot_core_pose(const BaseMotion& motion, std::int64_t utime) {
+    const Eigen::Quaterniond q(motion.T_odom_base.linear());
+    bot_core_pose_.utime = utime;
+    Eigen::Vector3d::Map(bot_core_pose_.pos) = motion.T_odom_base.translation();
+    Eigen::Vector3d::Map(bot_core_pose_.vel) = motion.T_odom_base.linear() * motion.linear_velocity_mps;
+    Eigen::Vector4d::Map(bot_core_pose_.orientation) = Eigen::Vector4d(q.w(), q.x(), q.y(), q.z());
+    Eigen::Vector3d::Map(bot_core_pose_.rotation_rate) = motion.angular_velocity_radps;
+    sender_.send(bot_core_channel_, bot_core_pose_);
 }
 
 void FramePublisher::publish_mask(const Frame& frame, std::int64_t utime) {
@@ -144,6 +173,15 @@ void FramePublisher::publish_tracks(const Frame& frame, std::int64_t utime) {
     tracks_.tracks.resize(count);
     for (std::size_t i = 0; i < count; ++i) fill(*by_distance_[i].second, tracks_.tracks[i]);
     sender_.send(tracks_channel_, tracks_);
+}
+
+void FramePublisher::publish_obstacles(const Frame& frame, const BaseMotion& motion, std::int64_t utime) {
+    const std::uint64_t sequence = frame.header.sequence;
+    if (obstacles_sequence_ && sequence - *obstacles_sequence_ < obstacles_every_) return;
+    obstacles_sequence_ = sequence;
+    obstacles_->extract(frame, motion.T_odom_base.translation(), obstacles_message_);
+    obstacles_message_.utime = utime;
+    sender_.send(obstacles_channel_, obstacles_message_);
 }
 
 }  // namespace dlod::daemon

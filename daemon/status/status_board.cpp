@@ -84,8 +84,9 @@ void StatusBoard::add(const PipelineFrame& frame, std::int64_t now_ns) {
     }
 }
 
-const status_t& StatusBoard::compose(const CounterList& counters, std::int64_t last_packet_ns, std::int64_t now_ns,
-                                     std::int64_t utime) {
+status_t StatusBoard::compose(const CounterList& counters, std::int64_t last_packet_ns, std::int64_t now_ns,
+                              std::int64_t utime) {
+    const std::lock_guard lock_status(status_mutex_);
     previous_counters_ = std::move(counters_);
     counters_ = {counters.begin(), counters.end()};
     status_.utime = utime;
@@ -105,6 +106,15 @@ const status_t& StatusBoard::compose(const CounterList& counters, std::int64_t l
     compose_health(last_packet_ns, now_ns);
     status_.memory = resident_bytes();
     status_.memory_peak = peak_bytes();
+    return status_;
+}
+
+status_t StatusBoard::answer(const CommandAnswer& answer, std::int64_t utime) {
+    const std::lock_guard lock(status_mutex_);
+    status_.utime = utime;
+    status_.command_id = answer.id;
+    status_.command_ok = answer.ok ? 1 : 0;
+    status_.command_answer = answer.text;
     return status_;
 }
 
@@ -163,6 +173,7 @@ void StatusBoard::compose_health(std::int64_t last_packet_ns, std::int64_t now_n
 }
 
 std::string StatusBoard::one_line() const {
+    const std::lock_guard lock(status_mutex_);
     std::string line = fmt::format("{}: {:.1f} frames/s, {:.1f} poses/s", health_name(status_.health),
                                    status_.frame_rate, status_.pose_rate);
     if (status_.pose_age >= 0) line += fmt::format(", pose {} ms old", status_.pose_age / 1000);

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/control/command_handler.hpp"
 #include "daemon/pipeline/pipeline_frame.hpp"
 #include "daemon/status/latency_window.hpp"
 
@@ -29,8 +30,10 @@ class StatusBoard {
 
     /// Call it once a second, on one thread: rates are over the time since the call before.
     /// @param last_packet_ns CLOCK_MONOTONIC, 0 where none came yet
-    const status_t& compose(const CounterList& counters, std::int64_t last_packet_ns, std::int64_t now_ns,
-                            std::int64_t utime);
+    status_t compose(const CounterList& counters, std::int64_t last_packet_ns, std::int64_t now_ns, std::int64_t utime);
+
+    /// The status composed last, with this answer, which stays in those that follow. From any thread.
+    status_t answer(const CommandAnswer& answer, std::int64_t utime);
 
     /// What is wrong with the sensor by its own account, for the health from now on; empty: nothing. On the thread of
     /// compose().
@@ -52,6 +55,7 @@ class StatusBoard {
     std::map<std::string, std::int64_t> rose_ns_;  ///< when a counter of losses was last seen to have risen
     std::uint64_t previous_poses_ = 0;
     std::string sensor_trouble_;
+    mutable std::mutex status_mutex_;  ///< guards status_
     status_t status_{};
 
     std::mutex mutex_;  ///< guards the rest, which workers write

@@ -1,10 +1,13 @@
 // Writes a few small inputs for each fuzzer: write_seeds FOLDER makes FOLDER/capture, FOLDER/metadata, ...
 #include <cstdio>
+#include <dlod/command_t.hpp>
 #include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
 
+#include "daemon/config/config.hpp"
+#include "daemon/config/config_file.hpp"
 #include "tests/driver/synthetic_sensor.hpp"
 #include "tests/support/network_bytes.hpp"
 
@@ -54,6 +57,38 @@ void write_operations(const std::filesystem::path& folder, std::size_t size) {
     }
 }
 
+/// Commands as the fuzzer reads them: length, then bytes.
+void write_commands(const std::filesystem::path& folder) {
+    for (const char* argument : {"", "hall", "../escaped", "debug"}) {
+        std::string input;
+        for (const std::int8_t number : {command_t::SAVE_MAP, command_t::RESTART_ODOMETRY, command_t::SET_LOG_LEVEL}) {
+            command_t command{};
+            command.utime = 1'700'000'000'000'000;
+            command.id = number;
+            command.command = number;
+            command.argument = argument;
+            std::string bytes(static_cast<std::size_t>(command.getEncodedSize()), '\0');
+            command.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+            input += static_cast<char>(bytes.size()) + bytes;
+        }
+        write(folder,
+              *argument == '.'    ? "escaped"
+              : *argument == '\0' ? "empty"
+                                  : argument,
+              input.data(), input.size());
+    }
+}
+
+void write_configurations(const std::filesystem::path& folder) {
+    const std::string all = daemon::to_yaml({});
+    write(folder, "all", all.data(), all.size());
+    for (const std::string text : {"sensor: {metadata: a.json, lidar_port: 7502}\nlcm: {url: none}\n",
+                                   "robot_body:\n  boxes_m: [0, 0, 0, 1, 1, 1]\npipeline: {pin_to_cpus: [0, 1]}\n",
+                                   "extrinsics: &a {rotation_wxyz: [1, 0, 0, 0]}\nodometry: {use_imu: off}\n"}) {
+        write(folder, std::to_string(text.size()), text.data(), text.size());
+    }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -64,6 +99,8 @@ int main(int argc, char** argv) {
     const std::filesystem::path folder = argv[1];
     write_captures(folder / "capture");
     write_metadata(folder / "metadata");
+    write_commands(folder / "command");
+    write_configurations(folder / "config");
     write_operations(folder / "reassembly", 120);
     write_operations(folder / "packets", 400);
     return 0;

@@ -1,10 +1,14 @@
-// A planner's end of dlod: prints each pose, the share of moving pixels, and the moving objects ahead.
+// A planner's end of dlod: prints each pose, the share of moving pixels, the moving objects, the nearest obstacle, the
+// sensor, and what is wrong.
 // usage: example_subscriber [LCM_URL [CHANNEL_PREFIX]]
 #include <bit>
 #include <cmath>
 #include <cstdio>
 #include <dlod/dynamic_mask_t.hpp>
+#include <dlod/obstacles_t.hpp>
 #include <dlod/pose_t.hpp>
+#include <dlod/sensor_t.hpp>
+#include <dlod/status_t.hpp>
 #include <dlod/tracks_t.hpp>
 #include <lcm/lcm-cpp.hpp>
 #include <string>
@@ -17,6 +21,9 @@ class Planner {
         if ((pose->flags & dlod::pose_t::VALID) == 0) {
             std::printf("%ld no valid pose, flags %d\n", static_cast<long>(pose->sequence), pose->flags);
             return;
+        }
+        if ((pose->flags & dlod::pose_t::RESTARTED) != 0) {
+            std::printf("odom begins anew: what was remembered in it means nothing any more\n");
         }
         pose_ = *pose;
         std::printf("%ld at %.2f %.2f %.2f m, %.2f m/s\n", static_cast<long>(pose->sequence), pose->position[0],
@@ -47,6 +54,25 @@ class Planner {
         }
     }
 
+    /// Only where lcm.obstacles.every_frames is set.
+    void on_obstacles(const lcm::ReceiveBuffer*, const std::string&, const dlod::obstacles_t* obstacles) {
+        if (obstacles->count == 0) return;
+        // The nearest comes first; a point in odom is origin + unit * (x, y, z).
+        const double x = obstacles->unit * obstacles->x[0];
+        const double y = obstacles->unit * obstacles->y[0];
+        std::printf("  %d obstacles within %.1f m, the nearest %.2f m away%s\n", obstacles->count, obstacles->radius,
+                    std::hypot(x, y), (obstacles->flags[0] & dlod::obstacles_t::DYNAMIC) != 0 ? ", moving" : "");
+    }
+
+    void on_sensor(const lcm::ReceiveBuffer*, const std::string&, const dlod::sensor_t* sensor) {
+        std::printf("sensor %s %s, %d x %d pixels, %.0f Hz\n", sensor->product_line.c_str(),
+                    sensor->serial_number.c_str(), sensor->rows, sensor->columns, sensor->frame_rate);
+    }
+
+    void on_status(const lcm::ReceiveBuffer*, const std::string&, const dlod::status_t* status) {
+        if (status->health != dlod::status_t::OK) std::printf("dlod says: %s\n", status->health_text.c_str());
+    }
+
   private:
     dlod::pose_t pose_{};
 };
@@ -64,6 +90,9 @@ int main(int argc, char** argv) {
     lcm.subscribe(prefix + "POSE", &Planner::on_pose, &planner);
     lcm.subscribe(prefix + "MASK", &Planner::on_mask, &planner);
     lcm.subscribe(prefix + "TRACKS", &Planner::on_tracks, &planner);
+    lcm.subscribe(prefix + "OBSTACLES", &Planner::on_obstacles, &planner);
+    lcm.subscribe(prefix + "SENSOR", &Planner::on_sensor, &planner);
+    lcm.subscribe(prefix + "STATUS", &Planner::on_status, &planner);
     while (lcm.handle() == 0) std::fflush(stdout);
     return 1;
 }

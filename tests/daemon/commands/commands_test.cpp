@@ -138,6 +138,38 @@ TEST_F(CommandsTest, AnEmptyCaptureIsSaidOnce) {
     EXPECT_EQ(outcome.output.find("metadata"), std::string::npos) << outcome.output;
 }
 
+TEST_F(CommandsTest, AnImuProfileThatIsNotKnownIsAWarningAndOdometryGoesOnWithoutImu) {
+    auto metadata = test::SyntheticCapture::metadata();
+    const std::string legacy = "\"udp_profile_imu\": \"LEGACY\"";
+    ASSERT_NE(metadata.find(legacy), std::string::npos);
+    metadata.replace(metadata.find(legacy), legacy.size(), "\"udp_profile_imu\": \"ACCEL32_GYRO32_NMEA\"");
+    EXPECT_TRUE(
+        ends(dlod({"replay", capture_, "--metadata", write("other_imu.json", metadata)}), 0,
+             {"ACCEL32_GYRO32_NMEA", "the IMU is not used", "12 frames, 12 valid poses", "imu_unknown_packets"}));
+}
+
+TEST_F(CommandsTest, TheRobotsOwnBodyIsNotSeen) {
+    // The hall's near wall becomes a part of the robot: fewer returns in every frame, and no error.
+    const auto points = [&](const std::string& name, const std::string& boxes) {
+        EXPECT_TRUE(ends(dlod({"replay", capture_, "--out", file(name), "--set", "robot_body.boxes_m=" + boxes}), 0,
+                         {"12 valid poses"}));
+        std::ifstream stream(file(name) + "/frames.csv");
+        std::string line;
+        std::getline(stream, line);
+        std::getline(stream, line);
+        for (int column = 0; column < 4; ++column) line.erase(0, line.find(',') + 1);
+        return std::stoi(line);
+    };
+    const int all = points("all", "[]");
+    const int without = points("without", "[-3, -30, -30, 3, 30, 30]");
+    EXPECT_LT(without, all - 1000);
+    EXPECT_GT(without, 1000);
+    EXPECT_TRUE(ends(dlod({"replay", capture_, "--set", "robot_body.boxes_m=[0, 0, 0, 1, 1]"}), 3,
+                     {"robot_body.boxes_m", "six"}));
+    EXPECT_TRUE(ends(dlod({"replay", capture_, "--set", "robot_body.boxes_m=[0, 0, 0, 1, -1, 1]"}), 3,
+                     {"robot_body.boxes_m", "box 1"}));
+}
+
 TEST_F(CommandsTest, AnotherMakersCaptureGivesNoFrames) {
     const auto capture = test::data_path("ouster/VLI-16-one-packet.pcap");
     if (!capture) GTEST_SKIP() << "the recorded captures are not there";

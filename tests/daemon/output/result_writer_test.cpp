@@ -92,6 +92,24 @@ TEST(ResultWriter, WritesTheFormatsToTheLetter) {
     for (int i = 0; i < 6; ++i) EXPECT_EQ(xyz[i], static_cast<float>(i + 1));
 }
 
+TEST(ResultWriter, WhatRoundsToZeroHasNoSign) {
+    const test::TemporaryFolder folder;
+    PipelineFrame frame(test::small_sensor());
+    frame.odometry.valid = true;
+    frame.odometry.T_world_sensor.translation() = Eigen::Vector3d(-0.0, -4e-10, -6e-10);
+    Track track;
+    track.box.center_m = {-4e-7, -6e-7, -0.0};
+    frame.detection.tracks = {track};
+    ResultWriter writer(folder.path(), TimingClock::kWall);
+    writer.write(frame);
+    writer.finish({});
+    EXPECT_EQ(content(folder.path() / "trajectory.tum").rfind("0.000000000 0.000000000 0.000000000 -0.000000001 ", 0),
+              0U)
+        << content(folder.path() / "trajectory.tum");
+    EXPECT_NE(content(folder.path() / "tracks.csv").find(",0.000000,-0.000001,0.000000,"), std::string::npos)
+        << content(folder.path() / "tracks.csv");
+}
+
 TEST(ResultWriter, AFolderThatCannotBeMadeIsNamed) {
     try {
         ResultWriter writer("/proc/nowhere/out", TimingClock::kWall);

@@ -3,35 +3,15 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <map>
 #include <random>
 
 #include "daemon/publish/bit_plane.hpp"
+#include "tests/support/recording_bus.hpp"
 
 namespace dlod::daemon {
 namespace {
 
-/// Keeps what is published.
-class RecordingBus final : public MessageBus {
-  public:
-    bool publish(const std::string& channel, std::span<const std::byte> message) override {
-        EXPECT_LE(channel.size() + 1 + message.size(), kLargestDatagram) << channel;
-        messages[channel].emplace_back(message.begin(), message.end());
-        return accepts;
-    }
-    template <class Message>
-    std::vector<Message> decoded(const std::string& channel) {
-        std::vector<Message> result;
-        for (const auto& bytes : messages[channel]) {
-            Message message;
-            EXPECT_GT(message.decode(bytes.data(), 0, static_cast<int>(bytes.size())), 0);
-            result.push_back(message);
-        }
-        return result;
-    }
-    std::map<std::string, std::vector<std::vector<std::byte>>> messages;
-    bool accepts = true;
-};
+using test::RecordingBus;
 
 SensorModel sensor_of(int height, int width) {
     SensorModel sensor;
@@ -69,7 +49,7 @@ TEST(FramePublisher, AMaskOf128By1024IsOneMessage) {
     frame.detection.label(2, 9) = static_cast<std::uint8_t>(PixelLabel::kDynamic);
     frame.detection.label(127, 1023) = static_cast<std::uint8_t>(PixelLabel::kUndecided);
     RecordingBus bus;
-    FramePublisher publisher(bus, sensor, Eigen::Isometry3d::Identity(), "DLOD_");
+    FramePublisher publisher(bus, sensor, Eigen::Isometry3d::Identity(), {});
     publisher.publish(frame, 123456);
     const auto masks = bus.decoded<dynamic_mask_t>("DLOD_MASK");
     ASSERT_EQ(masks.size(), 1U);
@@ -94,7 +74,9 @@ TEST(FramePublisher, LargerMasksGoOutAsPartsOfWholeRows) {
                 static_cast<std::uint8_t>(i % 7 == 0 ? PixelLabel::kDynamic : PixelLabel::kGround);
         }
         RecordingBus bus;
-        FramePublisher publisher(bus, sensor, Eigen::Isometry3d::Identity(), "A_RATHER_LONG_PREFIX_");
+        LcmConfig config;
+        config.channel_prefix = "A_RATHER_LONG_PREFIX_";
+        FramePublisher publisher(bus, sensor, Eigen::Isometry3d::Identity(), config);
         publisher.publish(frame, 5);
         const auto masks = bus.decoded<dynamic_mask_t>("A_RATHER_LONG_PREFIX_MASK");
         ASSERT_GT(masks.size(), 1U);
@@ -129,7 +111,7 @@ TEST(FramePublisher, OfTooManyTracksTheFarthestAreLeftOutAndCounted) {
         frame.detection.tracks.push_back(track);
     }
     RecordingBus bus;
-    FramePublisher publisher(bus, sensor, Eigen::Isometry3d::Identity(), "DLOD_");
+    FramePublisher publisher(bus, sensor, Eigen::Isometry3d::Identity(), {});
     publisher.publish(frame, 1);
     const auto messages = bus.decoded<tracks_t>("DLOD_TRACKS");
     ASSERT_EQ(messages.size(), 1U);
@@ -165,7 +147,7 @@ TEST(FramePublisher, PosesAreTheBases) {
     odometry.linear_velocity_mps = T_base_sensor.linear().transpose() * sensor_velocity_in_base;
     odometry.angular_velocity_radps = T_base_sensor.linear().transpose() * turn;
     RecordingBus bus;
-    FramePublisher publisher(bus, sensor, T_base_sensor, "DLOD_");
+    FramePublisher publisher(bus, sensor, T_base_sensor, {});
     publisher.publish(frame, 1);
     const auto pose = bus.decoded<pose_t>("DLOD_POSE").at(0);
     EXPECT_NEAR(pose.position[0], 4.0, 1e-9);
@@ -178,6 +160,37 @@ TEST(FramePublisher, PosesAreTheBases) {
         EXPECT_NEAR(pose.angular_velocity[i], turn[i], 1e-9);
     }
     EXPECT_EQ(pose.flags, +pose_t::VALID + +pose_t::IMU_USED + +pose_t::PREDICTED_ONLY);
+}
+
+TEST(FramePublisher, BotCorePosesAreThoseOfLibbotsStacks) {
+    // The fingerprint that libbot's own pose_t has, as LCM puts it into a message.
+    EXPECT_EQ(static_cast<std::uint64_t>(bot_core::pose_t::getHash()), 0x2e16efb052b0105eULL);
+    const SensorModel sensor = sensor_of(16, 512);
+    Frame frame(sensor);
+    auto& odometry = frame.odometry;
+    odometry.valid = true;
+    odometry.T_world_sensor = make_pose(so3_exp(Eigen::Vector3d(0.0, 0.0, M_PI / 2)), Eigen::Vector3d(1.0, 2.0, 3.0));
+    odometry.linear_velocity_mps = Eigen::Vector3d(0.5, 0.0, 0.0);
+    odometry.angular_velocity_radps = Eigen::Vector3d(0.1, 0.2, 0.3);
+    RecordingBus bus;
+    LcmConfig config;
+    config.bot_core_channel = "POSE";
+    FramePublisher publisher(bus, sensor, Eigen::Isometry3d::Identity(), config);
+    publisher.publish(frame, 42);
+    odometry.valid = false;
+    publisher.publish(frame, 43);
+    const auto poses = bus.decoded<bot_core::pose_t>("POSE");
+    ASSERT_EQ(poses.size(), 1U) << "a pose that is not valid cannot be told by its fields, so it is not sent";
+    const auto& pose = poses[0];
+    EXPECT_EQ(pose.utime, 42);
+    for (int i = 0; i < 3; ++i) {
+        EXPECT_NEAR(pose.pos[i], i + 1.0, 1e-12);
+        EXPECT_NEAR(pose.vel[i], i == 1 ? 0.5 : 0.0, 1e-12) << "in odom's axes";
+        EXPECT_NEAR(pose.rotation_rate[i], 0.1 * (i + 1), 1e-12) << "in the base's axes";
+        EXPECT_EQ(pose.accel[i], 0.0);
+    }
+    EXPECT_NEAR(pose.orientation[0], std::sqrt(0.5), 1e-12) << "w first";
+    EXPECT_NEAR(pose.orientation[3], std::sqrt(0.5), 1e-12);
 }
 
 TEST(FramePublisher, TheCovarianceIsMovedToTheBase) {
@@ -214,9 +227,10 @@ TEST(FramePublisher, AMessageThatIsNotSentIsCounted) {
     const Frame frame(sensor);
     RecordingBus bus;
     bus.accepts = false;
-    FramePublisher publisher(bus, sensor, Eigen::Isometry3d::Identity(), "DLOD_");
+    FramePublisher publisher(bus, sensor, Eigen::Isometry3d::Identity(), {});
     publisher.publish(frame, 1);
     EXPECT_EQ(publisher.failed(), 3U);
+    EXPECT_EQ(bus.messages.size(), 3U) << "obstacles and bot_core's pose are off by default";
 }
 
 }  // namespace

@@ -15,7 +15,7 @@ class StatusBoardTest : public testing::Test {
         frame_.odometry.valid = true;
     }
 
-    const status_t& at(double seconds, CounterList counters, double last_packet_s) {
+    status_t at(double seconds, CounterList counters, double last_packet_s) {
         const auto ns = [](double s) { return static_cast<std::int64_t>(1e9 * s); };
         return board_.compose(counters, ns(last_packet_s), ns(seconds), 42);
     }
@@ -28,7 +28,7 @@ class StatusBoardTest : public testing::Test {
 TEST_F(StatusBoardTest, RatesAreOverTheTimeSinceTheLastStatus) {
     at(2.0, {{"lidar_packets", 640}, {"frames", 10}}, 2.0);
     for (int i = 0; i < 18; ++i) pose_at(2.0 + 0.1 * i);
-    const auto& status = at(4.0, {{"lidar_packets", 1920}, {"frames", 30}}, 4.0);
+    const auto status = at(4.0, {{"lidar_packets", 1920}, {"frames", 30}}, 4.0);
     EXPECT_DOUBLE_EQ(status.packet_rate, 640.0);
     EXPECT_DOUBLE_EQ(status.frame_rate, 10.0);
     EXPECT_DOUBLE_EQ(status.pose_rate, 9.0);
@@ -46,7 +46,7 @@ TEST_F(StatusBoardTest, PercentilesAreOfTheLastFrames) {
         frame_.latency_ms = static_cast<float>(i);
         pose_at(2.0);
     }
-    const auto& status = at(2.0, {}, 2.0);
+    const auto status = at(2.0, {}, 2.0);
     ASSERT_EQ(status.stage_name.back(), "latency");
     EXPECT_EQ(status.stage_p50.back(), 50.0F);
     EXPECT_EQ(status.stage_p99.back(), 99.0F);
@@ -67,6 +67,20 @@ TEST_F(StatusBoardTest, HealthSaysWhatIsWrongAndWhatToDo) {
     EXPECT_EQ(at(20.0, {{"packets_kernel_drops", 5}}, 20.0).health, status_t::FAULT)
         << "packets, but no pose for five seconds";
     EXPECT_EQ(at(30.0, {{"packets_kernel_drops", 5}}, 20.0).health, status_t::WAITING);
+}
+
+TEST_F(StatusBoardTest, AnAnswerGoesOutAtOnceAndStays) {
+    pose_at(2.0);
+    EXPECT_EQ(at(2.0, {{"frames", 10}}, 2.0).command_id, 0) << "none yet";
+    const auto now = board_.answer({.id = 77, .ok = true, .text = "map saved"}, 1234);
+    EXPECT_EQ(now.utime, 1234);
+    EXPECT_EQ(now.counter_value, std::vector<std::int64_t>{10}) << "the rest is that of the last status";
+    for (const auto& status : {now, at(3.0, {{"frames", 20}}, 3.0)}) {
+        EXPECT_EQ(status.command_id, 77);
+        EXPECT_EQ(status.command_ok, 1);
+        EXPECT_EQ(status.command_answer, "map saved");
+    }
+    EXPECT_EQ(board_.answer({.id = 78, .ok = false, .text = "no"}, 1235).command_ok, 0);
 }
 
 }  // namespace

@@ -1,0 +1,80 @@
+#include "daemon/output/map_store.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <ctime>
+#include <utility>
+
+#include "daemon/output/point_cloud_file.hpp"
+
+namespace dlod::daemon {
+namespace {
+
+constexpr std::size_t kLongestName = 64;
+
+bool is_name_character(char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' ||
+           c == '.';
+}
+
+std::filesystem::path folder_of(const MapStoreConfig& config) {
+    if (!config.folder.empty()) return config.folder;
+    // systemd names the state directory.
+    const char* state = std::getenv("STATE_DIRECTORY");
+    return state == nullptr ? std::filesystem::path() : std::filesystem::path(state) / "maps";
+}
+
+std::string name_by_time() {
+    return fmt::format("map_{:%Y%m%dT%H%M%SZ}", fmt::gmtime(std::time(nullptr)));
+}
+
+}  // namespace
+
+bool is_map_name(std::string_view name) {
+    return !name.empty() && name.size() <= kLongestName && name.front() != '.' &&
+           std::all_of(name.begin(), name.end(), is_name_character);
+}
+
+MapStore::MapStore(const MapStoreConfig& config) : folder_(folder_of(config)), most_(config.most) {}
+
+bool MapStore::is_full(const std::string& name) const {
+    if (std::filesystem::exists(folder_ / (name + ".pcd"))) return false;
+    const auto maps = std::count_if(std::filesystem::directory_iterator(folder_), {},
+                                    [](const auto& entry) { return entry.path().extension() == ".pcd"; });
+    return maps >= most_;
+}
+
+MapStore::Result MapStore::save(std::string name, std::vector<CellTable::Entry> points) const {
+    if (folder_.empty()) return {false, "no folder for maps: set saved_maps.folder"};
+    if (name.empty()) name = name_by_time();
+    if (!is_map_name(name)) {
+        return {false, fmt::format("not a name for a map: 1 to {} letters, digits, '_', '-' and '.', no '.' first",
+                                   kLongestName)};
+    }
+    if (points.empty()) return {false, "the map has no points yet"};
+    const auto path = folder_ / name;
+    try {
+        std::filesystem::create_directories(folder_);
+        if (is_full(name)) {
+            return {false, fmt::format("{}: holds {} maps already: remove some, or raise saved_maps.most",
+                                       folder_.string(), most_)};
+        }
+        const auto map = CellTable::sorted(std::move(points));
+        OutputFile pcd(path.string() + ".pcd", OutputFile::Mode::kReplace);
+        OutputFile ply(path.string() + ".ply", OutputFile::Mode::kReplace);
+        write_pcd(pcd, map);
+        write_ply(ply, map);
+        pcd.close();
+        ply.close();
+        return {true, fmt::format("{}.pcd and .ply: {} points", path.string(), map.size())};
+    } catch (const OutputError& error) {
+        return {false, error.what()};
+    } catch (const std::filesystem::filesystem_error& error) {
+        return {false, fmt::format("{}: cannot be used for maps: {}", folder_.string(), error.code().message())};
+    }
+}
+
+}  // namespace dlod::daemon

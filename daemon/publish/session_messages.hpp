@@ -1,0 +1,45 @@
+// All that a session says over LCM.
+#pragma once
+
+#include <cstdint>
+#include <dlod/status_t.hpp>
+
+#include "daemon/publish/frame_publisher.hpp"
+#include "daemon/publish/lcm_bus.hpp"
+#include "daemon/publish/sensor_announcer.hpp"
+
+namespace dlod::daemon {
+
+class SessionMessages {
+  public:
+    /// Opens LCM. @throws MessageBusError
+    SessionMessages(const LcmConfig& config, const driver::SensorInfo& sensor, const Eigen::Isometry3d& T_base_sensor)
+        : bus_(config.url),
+          frames_(bus_, sensor.model, T_base_sensor, config),
+          sensor_(bus_, sensor, T_base_sensor, config.channel_prefix),
+          status_(bus_),
+          status_channel_(config.channel_prefix + "STATUS") {}
+
+    MessageBus& bus() { return bus_; }
+
+    /// The results of a frame. @param utime [us]. On one thread.
+    void publish(const Frame& frame, std::int64_t utime) { frames_.publish(frame, utime); }
+
+    // The rest on one thread, which may be another one.
+
+    /// The sensor's description, where it is due. @param now_ns CLOCK_MONOTONIC @param utime [us] host time
+    void announce_sensor(std::int64_t now_ns, std::int64_t utime) { sensor_.announce_if_due(now_ns, utime); }
+    void send(const status_t& status) { status_.send(status_channel_, status); }
+
+    /// Messages that could not be sent; from any thread.
+    std::uint64_t failed() const { return frames_.failed() + sensor_.failed() + status_.failed(); }
+
+  private:
+    LcmBus bus_;
+    FramePublisher frames_;
+    SensorAnnouncer sensor_;
+    MessageSender status_;
+    std::string status_channel_;
+};
+
+}  // namespace dlod::daemon

@@ -1,0 +1,151 @@
+#include "daemon/output/map_store.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <set>
+
+#include "tests/support/synthetic_capture.hpp"
+
+namespace dlod::daemon {
+namespace {
+
+std::string content(const std::filesystem::path& file) {
+    std::ifstream stream(file, std::ios::binary);
+    EXPECT_TRUE(stream) << file;
+    return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+std::set<std::string> files_in(const std::filesystem::path& folder) {
+    std::set<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(folder)) names.insert(entry.path().filename());
+    return names;
+}
+
+/// Points in another order than that of their cells.
+std::vector<CellTable::Entry> points(std::size_t count) {
+    std::vector<CellTable::Entry> entries;
+    for (std::size_t i = count; i > 0; --i) {
+        const auto v = static_cast<float>(i);
+        entries.push_back({i, {v, 2.0F * v, -v}});
+    }
+    return entries;
+}
+
+/// The floats behind the header, which ends with `last_line`.
+std::vector<float> floats_after(const std::string& file, const std::string& last_line) {
+    const auto at = file.find(last_line);
+    if (at == std::string::npos) return {};
+    std::vector<float> values((file.size() - at - last_line.size()) / sizeof(float));
+    std::memcpy(values.data(), file.data() + at + last_line.size(), values.size() * sizeof(float));
+    return values;
+}
+
+TEST(MapStore, NamesCannotLeadOutOfTheFolder) {
+    for (const char* name : {"a", "site_2", "2026-11-22", "v1.2", "A-b_c.9"}) EXPECT_TRUE(is_map_name(name)) << name;
+    for (const char* name : {"", ".", "..", ".hidden", "../up", "a/b", "/etc/passwd", "a\\b", "a b", "a\nb",
+                             "caf\xc3\xa9", "a;b", "$HOME", "~"}) {
+        EXPECT_FALSE(is_map_name(name)) << name;
+    }
+    EXPECT_FALSE(is_map_name(std::string("a\0b", 3)));
+    EXPECT_TRUE(is_map_name(std::string(64, 'x')));
+    EXPECT_FALSE(is_map_name(std::string(65, 'x')));
+}
+
+TEST(MapStore, WritesPcdAndPlyInTheOrderOfTheCells) {
+    const test::TemporaryFolder folder;
+    const MapStore store({.folder = (folder.path() / "new/maps").string()});
+    const auto result = store.save("hall", points(3));
+    EXPECT_TRUE(result.ok) << result.text;
+    EXPECT_NE(result.text.find("hall.pcd"), std::string::npos) << result.text;
+    EXPECT_NE(result.text.find("3 points"), std::string::npos) << result.text;
+    EXPECT_EQ(files_in(folder.path() / "new/maps"), (std::set<std::string>{"hall.pcd", "hall.ply"}));
+    const std::vector<float> expected = {1, 2, -1, 2, 4, -2, 3, 6, -3};
+    const auto pcd = content(folder.path() / "new/maps/hall.pcd");
+    EXPECT_NE(pcd.find("POINTS 3\n"), std::string::npos);
+    EXPECT_EQ(floats_after(pcd, "DATA binary\n"), expected);
+    const auto ply = content(folder.path() / "new/maps/hall.ply");
+    EXPECT_EQ(ply.rfind("ply\nformat binary_little_endian 1.0\n", 0), 0U);
+    EXPECT_NE(ply.find("element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"), std::string::npos);
+    EXPECT_EQ(floats_after(ply, "end_header\n"), expected);
+}
+
+TEST(MapStore, WithoutANameItIsTheTime) {
+    const test::TemporaryFolder folder;
+    const MapStore store({.folder = folder.path().string()});
+    EXPECT_TRUE(store.save("", points(1)).ok);
+    const auto files = files_in(folder.path());
+    ASSERT_EQ(files.size(), 2U);
+    EXPECT_EQ(files.begin()->rfind("map_2", 0), 0U) << *files.begin();
+    EXPECT_TRUE(is_map_name(*files.begin()));
+}
+
+TEST(MapStore, TheServicesStateDirectoryIsTheDefault) {
+    const test::TemporaryFolder folder;
+    ::unsetenv("STATE_DIRECTORY");
+    const auto nowhere = MapStore({}).save("a", points(1));
+    EXPECT_FALSE(nowhere.ok);
+    EXPECT_NE(nowhere.text.find("saved_maps.folder"), std::string::npos) << nowhere.text;
+    ::setenv("STATE_DIRECTORY", folder.path().c_str(), 1);
+    EXPECT_TRUE(MapStore({}).save("a", points(1)).ok);
+    ::unsetenv("STATE_DIRECTORY");
+    EXPECT_EQ(files_in(folder.path() / "maps"), (std::set<std::string>{"a.pcd", "a.ply"}));
+}
+
+TEST(MapStore, AFullDiskLeavesWhatWasThere) {
+    const test::TemporaryFolder folder;
+    const MapStore store({.folder = folder.path().string()});
+    ASSERT_TRUE(store.save("a", points(2)).ok);
+    const auto before = content(folder.path() / "a.pcd");
+    std::signal(SIGXFSZ, SIG_IGN);
+    rlimit old{};
+    ::getrlimit(RLIMIT_FSIZE, &old);
+    const rlimit small{.rlim_cur = 100'000, .rlim_max = old.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &small);
+    const auto result = store.save("a", points(100'000));
+    const auto other = store.save("b", points(100'000));
+    ::setrlimit(RLIMIT_FSIZE, &old);
+    EXPECT_FALSE(result.ok);
+    EXPECT_NE(result.text.find("a.pcd.part: cannot write"), std::string::npos) << result.text;
+    EXPECT_FALSE(other.ok);
+    EXPECT_EQ(content(folder.path() / "a.pcd"), before);
+    EXPECT_EQ(files_in(folder.path()), (std::set<std::string>{"a.pcd", "a.ply"})) << "and nothing else";
+}
+
+TEST(MapStore, AMapWithoutPointsReplacesNone) {
+    const test::TemporaryFolder folder;
+    const MapStore store({.folder = folder.path().string()});
+    ASSERT_TRUE(store.save("a", points(2)).ok);
+    const auto before = content(folder.path() / "a.pcd");
+    EXPECT_FALSE(store.save("a", {}).ok);
+    EXPECT_EQ(content(folder.path() / "a.pcd"), before);
+}
+
+TEST(MapStore, AFolderThatCannotBeUsedIsNamed) {
+    const test::TemporaryFolder folder;
+    std::ofstream(folder.path() / "file") << "x";
+    for (const auto& place : {folder.path() / "file", std::filesystem::path("/proc/nowhere")}) {
+        const auto result = MapStore({.folder = place.string()}).save("a", points(1));
+        EXPECT_FALSE(result.ok);
+        EXPECT_NE(result.text.find(place.string()), std::string::npos) << result.text;
+    }
+}
+
+TEST(MapStore, AFullFolderTakesNoFurtherMap) {
+    const test::TemporaryFolder folder;
+    const MapStore store({.folder = folder.path().string(), .most = 2});
+    EXPECT_TRUE(store.save("a", points(1)).ok);
+    EXPECT_TRUE(store.save("b", points(1)).ok);
+    const auto result = store.save("c", points(1));
+    EXPECT_FALSE(result.ok);
+    EXPECT_NE(result.text.find("saved_maps.most"), std::string::npos) << result.text;
+    EXPECT_TRUE(store.save("b", points(2)).ok) << "one that is there can be replaced";
+}
+
+}  // namespace
+}  // namespace dlod::daemon
