@@ -25,6 +25,9 @@ void* allocate(std::size_t size, std::size_t alignment) {
 
 }  // namespace
 
+// At -O1 GCC 12 sees free() in the inlined operator delete, but not that operator new is replaced too.
+#pragma GCC diagnostic ignored "-Wmismatched-new-delete"
+
 void* operator new(std::size_t size) {
     return allocate(size, alignof(std::max_align_t));
 }
