@@ -125,5 +125,36 @@ TEST(KalmanFilter, MatchesTheTextbookForm) {
     EXPECT_LT((filter.covariance() - (KalmanFilter::Covariance::Identity() - K * H) * P).norm(), 1e-9);
 }
 
+TEST(KalmanFilter, GrowthMovesTheMiddleButIsNoMotion) {
+    const KalmanConfig config;
+    BoxMeasurement m;
+    m.box.center_m = {10.0, 0.0, 0.0};
+    m.box.size_m = {2.0, 1.8, 1.5};
+    KalmanFilter filter(m, config);
+    filter.grow(3.0, 0.0, 0.0, 0.0);
+    EXPECT_NEAR(filter.box().center_m.x(), 11.5, 1e-9);
+    EXPECT_NEAR(filter.box().size_m.x(), 5.0, 1e-9);
+    EXPECT_NEAR(filter.speed(), 0.0, 1e-9);
+    // It proves to be shorter: the end that did not move stays where it was.
+    filter.predict(0.1, config);
+    BoxMeasurement shorter = m;
+    shorter.plane_covariance = 100.0 * Eigen::Matrix2d::Identity();
+    shorter.box.size_m.x() = 4.0;
+    shorter.size_sd_m.x() = 0.01;
+    shorter.box.center_m.x() = 11.0;
+    filter.update(shorter, config);
+    EXPECT_NEAR(filter.box().size_m.x(), 4.0, 0.05);
+    EXPECT_NEAR(filter.box().center_m.x() - 0.5 * filter.box().size_m.x(), 9.0, 0.1);
+}
+
+TEST(KalmanFilter, AMeasuredVelocityIsTakenInByItsCovariance) {
+    const KalmanConfig config;
+    BoxMeasurement m;
+    KalmanFilter filter(m, config);
+    filter.update_velocity({8.0, 1.0}, Eigen::Vector2d(0.01, 1e6).asDiagonal());
+    EXPECT_NEAR(filter.velocity().x(), 8.0, 0.1);
+    EXPECT_NEAR(filter.velocity().y(), 0.0, 0.1);
+}
+
 }  // namespace
 }  // namespace dlod
