@@ -157,7 +157,7 @@ std::size_t Odometry::State::flat_points(const Frame& frame) {
     return flat;
 }
 
-/// Begins a map with this scan. Nothing is known of its velocity yet: the next scan will tell.
+/// Begins a map with this scan. Nothing is known of its velocity yet, unless the IMU is quiet: the next scan will tell.
 void Odometry::State::start(const Frame& frame, const Eigen::Isometry3d& T_world_sensor) {
     const bool with_imu = monitor.usable() && !imu.empty();
     Eigen::Isometry3d T = T_world_sensor;
@@ -172,6 +172,9 @@ void Odometry::State::start(const Frame& frame, const Eigen::Isometry3d& T_world
     const Eigen::Vector3d gravity =
         started ? filter.state().gravity_mps2 : Eigen::Vector3d(0.0, 0.0, -kStandardGravity_mps2);
     filter.initialize(T, gravity, frame.header.stamp_ns, with_imu ? &imu : nullptr);
+    if (with_imu && monitor.quiet()) {
+        for (int axis = 0; axis < 3; ++axis) filter.observe_rest(Eigen::Vector3d::Unit(axis));
+    }
     if (monitor.faulty()) flags |= OdometryResult::kImuFaulty;
     started = true;
     map_sequence = frame.header.sequence;
