@@ -16,11 +16,11 @@ SensorModel sensor_of(int height, int width) {
     return sensor;
 }
 
-/// Points anywhere in a cube of 4 m around the sensor; every tenth pixel has no return, rows from 8 on see only far
+/// Points anywhere in a cube of 3 m around the sensor; every tenth pixel has no return, rows from 8 on see only far
 /// ones.
 void fill(Frame& frame) {
     std::mt19937 random(5);
-    std::uniform_real_distribution<float> near(-2.0F, 2.0F);
+    std::uniform_real_distribution<float> near(-1.5F, 1.5F);
     const auto width = static_cast<std::size_t>(frame.cloud.x.width());
     for (std::size_t i = 0; i < frame.cloud.x.size(); ++i) {
         const float scale = i / width < 8 ? 1.0F : 20.0F;

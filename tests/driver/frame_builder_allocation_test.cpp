@@ -1,49 +1,14 @@
-// The packet path must not allocate: every allocation of this program is counted while a test asks for it.
+// The packet path must not allocate: every allocation of the program is counted.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cstddef>
-#include <cstdlib>
 #include <memory>
-#include <new>
 #include <vector>
 
 #include "driver/geometry.hpp"
 #include "driver/imu.hpp"
 #include "tests/driver/synthetic_sensor.hpp"
-
-namespace {
-
-bool counting = false;
-int allocations = 0;
-
-void* allocate(std::size_t size, std::size_t alignment) {
-    if (counting) ++allocations;
-    void* memory = nullptr;
-    if (posix_memalign(&memory, std::max(alignment, sizeof(void*)), size) != 0) throw std::bad_alloc();
-    return memory;
-}
-
-}  // namespace
-
-void* operator new(std::size_t size) {
-    return allocate(size, alignof(std::max_align_t));
-}
-void* operator new(std::size_t size, std::align_val_t alignment) {
-    return allocate(size, static_cast<std::size_t>(alignment));
-}
-void operator delete(void* memory) noexcept {
-    std::free(memory);
-}
-void operator delete(void* memory, std::size_t) noexcept {
-    std::free(memory);
-}
-void operator delete(void* memory, std::align_val_t) noexcept {
-    std::free(memory);
-}
-void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
-    std::free(memory);
-}
+#include "tests/support/allocation_counter.hpp"
 
 namespace dlod::driver {
 namespace {
@@ -88,14 +53,14 @@ TEST(FrameBuilderAllocation, NoneOnThePacketPath) {
             free.push_back(frame);
             ++frames;
         });
-    counting = true;
+    const std::size_t before = dlod::test::allocation_count();
     for (const auto& packet : packets)
         builder.push({.data = packet, .receive_ns = 0, .sender_address = {}, .sender_port = 0, .destination_port = 0});
     builder.flush();
-    counting = false;
+    const std::size_t after = dlod::test::allocation_count();
     EXPECT_EQ(frames, 8);
     EXPECT_EQ(builder.counters().restarts.value(), 1U);
-    EXPECT_EQ(allocations, 0);
+    EXPECT_EQ(after, before);
 }
 
 }  // namespace

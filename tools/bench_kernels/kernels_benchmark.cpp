@@ -162,7 +162,8 @@ void association(benchmark::State& state) {
         seen.box.center_m = {i % 6 * 0.8, i / 6 * 0.8, 0.0};
         seen.box.size_m = {0.6, 0.5, 1.7};
         filters.emplace_back(seen, KalmanConfig{});
-        tracks.push_back({.visible = seen.box, .filter = &filters.back(), .points = 100, .dt_s = 0.1});
+        tracks.push_back(
+            {.visible = seen.box, .whole = seen.box, .filter = &filters.back(), .points = 100, .dt_s = 0.1});
         detections.push_back({.visible = seen.box, .points = 100});
         detections.back().visible.center_m.x() += 0.1;
     }

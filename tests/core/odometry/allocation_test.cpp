@@ -2,50 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <atomic>
 #include <cmath>
-#include <cstdlib>
-#include <new>
 
 #include "core/map/keyframe_cloud.hpp"
 #include "core/odometry/odometry.hpp"
 #include "core/preprocess/subsampling.hpp"
+#include "tests/support/allocation_counter.hpp"
 #include "tests/support/simulated_drive.hpp"
-
-namespace {
-
-std::atomic<std::size_t> allocations{0};
-
-void* allocate(std::size_t size, std::size_t alignment) {
-    allocations.fetch_add(1, std::memory_order_relaxed);
-    void* const p = std::aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment);
-    if (p == nullptr) throw std::bad_alloc();
-    return p;
-}
-
-}  // namespace
-
-// At -O1 GCC 12 sees free() in the inlined operator delete, but not that operator new is replaced too.
-#pragma GCC diagnostic ignored "-Wmismatched-new-delete"
-
-void* operator new(std::size_t size) {
-    return allocate(size, alignof(std::max_align_t));
-}
-void* operator new(std::size_t size, std::align_val_t alignment) {
-    return allocate(size, static_cast<std::size_t>(alignment));
-}
-void operator delete(void* p) noexcept {
-    std::free(p);
-}
-void operator delete(void* p, std::size_t) noexcept {
-    std::free(p);
-}
-void operator delete(void* p, std::align_val_t) noexcept {
-    std::free(p);
-}
-void operator delete(void* p, std::size_t, std::align_val_t) noexcept {
-    std::free(p);
-}
 
 namespace dlod::test {
 namespace {
@@ -71,10 +34,10 @@ TEST(Allocation, PreparationAndOdometryTakeNothingInTheSteadyState) {
         drive.fill(k, frame);
         OdometryFeedback& slot = feedback[static_cast<std::size_t>(k % kFeedbackDelay)];
         const bool new_keyframe = k >= kFeedbackDelay && slot.has_keyframe;
-        const std::size_t before = allocations;
+        const std::size_t before = allocation_count();
         subsampling.process(frame);
         odometry.process(frame, k >= kFeedbackDelay ? &slot : nullptr);
-        const std::size_t during = allocations - before;
+        const std::size_t during = allocation_count() - before;
         ASSERT_TRUE(frame.odometry.valid);
         if (k >= kWarm && !new_keyframe) {
             EXPECT_EQ(during, 0U) << k;

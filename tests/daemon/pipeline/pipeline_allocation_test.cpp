@@ -1,48 +1,13 @@
-// In the steady state the pipeline allocates next to nothing: every allocation of this program is counted.
+// In the steady state the pipeline allocates next to nothing: every allocation of the program is counted.
 #include <gtest/gtest.h>
 #include <poll.h>
 
-#include <algorithm>
-#include <atomic>
 #include <cstddef>
-#include <cstdlib>
-#include <new>
 
 #include "daemon/pipeline/pipeline.hpp"
 #include "driver/pcap_source.hpp"
+#include "tests/support/allocation_counter.hpp"
 #include "tests/support/synthetic_capture.hpp"
-
-namespace {
-
-std::atomic<std::uint64_t> allocations{0};
-
-void* allocate(std::size_t size, std::size_t alignment) {
-    allocations.fetch_add(1, std::memory_order_relaxed);
-    void* memory = nullptr;
-    if (posix_memalign(&memory, std::max(alignment, sizeof(void*)), size) != 0) throw std::bad_alloc();
-    return memory;
-}
-
-}  // namespace
-
-void* operator new(std::size_t size) {
-    return allocate(size, alignof(std::max_align_t));
-}
-void* operator new(std::size_t size, std::align_val_t alignment) {
-    return allocate(size, static_cast<std::size_t>(alignment));
-}
-void operator delete(void* memory) noexcept {
-    std::free(memory);
-}
-void operator delete(void* memory, std::size_t) noexcept {
-    std::free(memory);
-}
-void operator delete(void* memory, std::align_val_t) noexcept {
-    std::free(memory);
-}
-void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
-    std::free(memory);
-}
 
 namespace dlod::daemon {
 namespace {
@@ -57,13 +22,13 @@ TEST(PipelineAllocation, NextToNoneInTheSteadyState) {
     const auto sensor = driver::load_metadata(folder.path() / "drive.json");
     driver::PcapSource source(capture, {.ports = {sensor.lidar_port, sensor.imu_port}, .reassembly = {}});
     std::uint64_t frames = 0;
-    std::uint64_t before = 0;
-    std::uint64_t after = 0;
+    std::size_t before = 0;
+    std::size_t after = 0;
     FrameSinks sinks;
     sinks.finished = [&](const PipelineFrame&) {
         ++frames;
-        if (frames == kWarmUp) before = allocations.load();
-        after = allocations.load();
+        if (frames == kWarmUp) before = test::allocation_count();
+        after = test::allocation_count();
     };
     Pipeline pipeline(sensor, {}, {}, source, std::move(sinks), {.threads = 1});
     pipeline.start();
