@@ -1,6 +1,7 @@
 #include "core/evidence/detection.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "core/evidence/completion.hpp"
 #include "core/evidence/evidence_image.hpp"
@@ -109,6 +110,9 @@ void Detector::State::complete(Frame& frame) {
     completion.begin();
     completion.take(result.pixels);
     completed.clear();
+    // Where free space is seen, it tells what moves from what stands where the submap ends; the residual alone does
+    // not.
+    const float cap_m = config.use_free_space ? std::numeric_limits<float>::infinity() : frame.odometry.residual_cap_m;
     for (Detection& detection : result.detections) {
         const std::size_t first = completed.size();
         const auto own = std::span(result.pixels).subspan(detection.first, detection.count);
@@ -121,7 +125,7 @@ void Detector::State::complete(Frame& frame) {
         const auto pixels = std::span<const PixelIndex>(completed).subspan(first);
         mark_occlusion(pixels, frame.cloud.range_m, config.occlusion_step_m, row_ends, detection);
         if (!config.use_residual) continue;
-        const AverageResidual residual = average_residual(pixels, residuals.image());
+        const AverageResidual residual = average_residual(pixels, residuals.image(), cap_m);
         detection.average_residual_m = residual.mean_m;
         detection.residual_points = residual.count;
     }

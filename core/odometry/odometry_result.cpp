@@ -39,6 +39,7 @@ void Odometry::State::write_result(Frame& frame) {
     place(frame.prepared.points, motion, placed);
     scan_to_submap.residuals(frame.prepared.points, placed, keyframes.submap(), origin, out.residual_pixel,
                              out.residual_m, &frame.prepared.ground);
+    out.residual_cap_m = static_cast<float>(config.scan_to_submap.residual_cap_m);
     // A first scan has been deskewed without its velocity: it is no keyframe.
     out.keyframe =
         registered && !bootstrapping && keyframes.is_due(out.T_world_sensor, median_range(frame.prepared.points));

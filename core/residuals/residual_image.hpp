@@ -2,9 +2,9 @@
 // Residual-based Classification", Algorithm 1).
 #pragma once
 
-#include "core/types/frame.hpp"
-
 #include <span>
+
+#include "core/types/frame.hpp"
 
 namespace dlod {
 
@@ -25,7 +25,10 @@ struct AverageResidual {
     int count = 0;
 };
 
-/// Algorithm 1: the mean of the non-zero residuals over the pixels of a segment.
-AverageResidual average_residual(std::span<const PixelIndex> segment, const Image<float>& residual_image);
+/// Algorithm 1: the mean of the non-zero residuals over the pixels of a segment. A segment of which hardly a point has
+/// anything of the submap near it stands where the submap ends: none of its points has a residual, as none would have a
+/// counterpart within the gate of a registration by nearest neighbours.
+/// @param cap_m residual of points with nothing near them; infinity: their residuals count as well
+AverageResidual average_residual(std::span<const PixelIndex> segment, const Image<float>& residual_image, float cap_m);
 
 }  // namespace dlod

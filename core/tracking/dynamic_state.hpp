@@ -18,7 +18,7 @@ struct MotionCues {
     int free_points = 0;      ///< pixels where earlier frames saw free space
     int occupied_points = 0;  ///< pixels where they saw a surface
     int unknown_points = 0;
-    double shift_m = 0.0;                 ///< of the box centre from the track's first position, ground plane
+    double shift_m = 0.0;  ///< of what is seen, from where the track began, ground plane: both ends of its box
     double displacement_log_odds = 0.0;   ///< of "moved" against "stayed", from the registration of its own points
     bool sustained_displacement = false;  ///< it has agreed with the filtered velocity for a while
     bool left_its_place = false;          ///< and is longer than that what it hides could feign

@@ -6,6 +6,7 @@
 
 #include "core/tracking/bounding_box.hpp"
 #include "core/tracking/rectangle_fit.hpp"
+#include "core/tracking/visible_shift.hpp"
 
 namespace dlod {
 
@@ -75,7 +76,7 @@ TrackedObject::TrackedObject(std::uint32_t id, const Frame& frame, const Detecti
     : id_(id),
       visible_(visible_box(frame, shapes, sighting, largest_shape(shapes, sighting).axis.yaw_rad)),
       filter_(first_measurement(shapes, sighting, visible_, config.filter), config.filter),
-      origin_m_(filter_.box().center_m) {
+      first_visible_(visible_) {
     std::vector<OrientedBox> nothing_to_clear;
     see(frame, shapes, sighting, config, nothing_to_clear);
 }
@@ -137,6 +138,7 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
         filter_.update(m, config.filter);
         assume_extent(sighting.visibility);
     }
+    const double shift_m = visible_shift_m(first_visible_, visible_);
     // At the stamp, as the filter's centre.
     visible_.center_m += shape.age_s * filter_.velocity() - filter_.box().center_m;
 
@@ -154,7 +156,7 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
     }
     cues.average_residual_m = cues.residual_points > 0 ? residual_sum / cues.residual_points : 0.0;
     cues.height_m = visible_.size_m.z();
-    cues.shift_m = (filter_.box().center_m - origin_m_).head<2>().norm();
+    cues.shift_m = shift_m;
     cues.dt_s = unseen_s_;
     cues.position_m = filter_.box().center_m.head<2>();
     if (config.state.use_displacement && !clear_without_displacement(cues))

@@ -76,7 +76,7 @@ class TrackedObject {
     KalmanFilter filter_;
     MotionBelief belief_;
     BoxHistory history_;
-    Eigen::Vector3d origin_m_;
+    OrientedBox first_visible_;  ///< as it was seen first, world frame
     PointSample before_;  ///< points of half a second to a second ago, or of the first sighting
     PointSample since_;   ///< those that follow them
     Eigen::Vector2d before_center_m_ = Eigen::Vector2d::Zero(), since_center_m_ = Eigen::Vector2d::Zero();

@@ -95,7 +95,7 @@ struct DynamicStateConfig {
         v.parameter("theta_res", theta_res, Range{0.0, 10.0}, "1",
                     "average residual over height that speaks for motion (Eq. 6)");
         v.parameter("theta_disp_m", theta_disp_m, Range{0.0, 10.0}, "m",
-                    "the paper's rule: distance from the first position before an object may be dynamic");
+                    "the paper's rule: shift of both ends from the first position before an object may be dynamic");
         v.parameter("min_hits", min_hits, Range{1, 100}, "frames",
                     "detections before an object may be dynamic when cues are fused");
         v.parameter("dynamic_log_odds", dynamic_log_odds, Range{0.1, 50.0}, "1",

@@ -101,6 +101,7 @@ struct OdometryResult {
     /// Residuals of the scan-to-submap registration: distance of each registered point to its counterpart.
     AlignedVector<PixelIndex> residual_pixel;
     AlignedVector<float> residual_m;
+    float residual_cap_m = 0.0F;    ///< what residual_m says where nothing of the submap is near
     /// Rows of T_stamp_column by measurement: turns a point of StructuredCloud into the sensor frame at the stamp.
     AlignedVector<float> deskew[12];  ///< row-major 3 x 4, each [W]
     /// The deskewed cloud: sensor frame at the stamp; 0, 0, 0 where there is no return.

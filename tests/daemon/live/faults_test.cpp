@@ -16,7 +16,13 @@ namespace {
 using namespace std::chrono_literals;
 using test::FakeSensor;
 using test::LiveRun;
-using test::on_live_ports;
+
+test::SyntheticSensor on_live_ports() {
+    test::SyntheticSensor sensor;
+    sensor.lidar_port = test::kLiveLidarPort;
+    sensor.imu_port = test::kLiveImuPort;
+    return sensor;
+}
 
 class Faults : public testing::Test {
   protected:

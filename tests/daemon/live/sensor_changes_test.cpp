@@ -14,7 +14,13 @@ namespace {
 using namespace std::chrono_literals;
 using test::FakeSensor;
 using test::LiveRun;
-using test::on_live_ports;
+using test::SyntheticSensor;
+
+SyntheticSensor on_live_ports(SyntheticSensor sensor = {}) {
+    sensor.lidar_port = test::kLiveLidarPort;
+    sensor.imu_port = test::kLiveImuPort;
+    return sensor;
+}
 
 auto health(std::int8_t health, const std::string& text) {
     return [=](const status_t& status) {
