@@ -35,6 +35,7 @@ mkdir -p "$folder"
 if [[ ! -f $folder/lap_truth/poses_tum.txt ]]; then
     "$build/tools/sim/dlod-sim" square --lap --speed 3 --duration 30 --name lap --out "$folder"
 fi
+"$build/daemon/dlod" replay "$folder/lap.pcap" --out "$folder/reference" &>"$folder/reference.log"
 url='udpm://239.255.76.97:17697?ttl=0'
 port=17602
 "$build/daemon/dlod" run --set "sensor.metadata=$folder/lap.json" --set sensor.lidar_port=$port \
@@ -45,7 +46,8 @@ trap 'kill -TERM $dlod 2>/dev/null || true' EXIT
 sleep 1
 
 good=0
-"$build/tools/soak/dlod-soak" "$folder/lap" --lcm "$url" --port $port --minutes "$minutes" | tee "$report" || good=1
+"$build/tools/soak/dlod-soak" "$folder/lap" --reference "$folder/reference/trajectory.tum" --lcm "$url" --port $port \
+    --minutes "$minutes" | tee "$report" || good=1
 trap - EXIT
 kill -TERM $dlod || true
 code=0

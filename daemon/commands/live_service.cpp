@@ -102,6 +102,7 @@ void LiveService::begin_session_if_asked() {
     } catch (const MessageBusError& error) {
         // The network may come up later than the service.
         messages_trouble_ = error.what();
+        service_.ready(messages_trouble_);
         next_attempt_ = Clock::now() + kAttemptPeriod;
         return;
     }

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "daemon/control/command_actions.hpp"
 #include "daemon/sensor/udp_options.hpp"
 #include "daemon/service/thread_setup.hpp"
 
@@ -75,8 +76,7 @@ void LiveSession::start() {
     pipeline_.start();
     if (messages_) {
         messages_->announce_sensor(monotonic_ns(), StepTimer::now_ns(CLOCK_REALTIME) / 1000);
-        if (config_.lcm.commands && CommandListener::can_listen(config_.lcm.url))
-            control_ = std::make_unique<RemoteControl>(config_.lcm, maps_, pipeline_, board_, messages_->bus());
+        control_ = RemoteControl::listen(config_.lcm, pipeline_actions(maps_, pipeline_), board_, messages_->bus());
     }
     service_.ready("waiting for packets");
     spdlog::info("receiving on port {}, {}", fmt::join(socket_.ports(), " and "), description_);

@@ -1,5 +1,7 @@
 #include "daemon/commands/replay_messages.hpp"
 
+#include "daemon/control/command_actions.hpp"
+
 namespace dlod::daemon {
 namespace {
 
@@ -22,9 +24,7 @@ void ReplayMessages::add(const PipelineFrame& frame) {
 }
 
 void ReplayMessages::listen(Pipeline& pipeline) {
-    if (config_.commands && CommandListener::can_listen(config_.url)) {
-        control_ = std::make_unique<RemoteControl>(config_, maps_, pipeline, board_, messages_.bus());
-    }
+    control_ = RemoteControl::listen(config_, pipeline_actions(maps_, pipeline), board_, messages_.bus());
 }
 
 void ReplayMessages::report_if_due(const Pipeline& pipeline, const driver::PacketSource& source) {

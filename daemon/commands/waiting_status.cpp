@@ -2,21 +2,21 @@
 
 #include <spdlog/spdlog.h>
 
+#include "daemon/control/command_actions.hpp"
 #include "daemon/pipeline/stage_times.hpp"
 
 namespace dlod::daemon {
 
 WaitingStatus::WaitingStatus(const Config& config, std::int64_t start_ns)
-    : url_(config.lcm.url),
-      channel_(config.lcm.channel_prefix + "STATUS"),
-      board_(DLOD_VERSION, "none yet", start_ns) {}
+    : config_(config.lcm), board_(DLOD_VERSION, "none yet", start_ns) {}
 
 /// The network may not be up yet: systemd's status line works without.
 void WaitingStatus::open_bus() {
-    if (bus_ || url_ == "none") return;
+    if (bus_ || config_.url == "none") return;
     try {
-        bus_ = std::make_unique<LcmBus>(url_);
+        bus_ = std::make_unique<LcmBus>(config_.url);
         sender_ = std::make_unique<MessageSender>(*bus_);
+        control_ = RemoteControl::listen(config_, waiting_actions(), board_, *bus_);
     } catch (const MessageBusError& error) {
         spdlog::debug("{}", error.what());
     }
@@ -25,9 +25,14 @@ void WaitingStatus::open_bus() {
 void WaitingStatus::report(const std::string& trouble) {
     open_bus();
     board_.set_sensor_trouble(trouble);
+    CounterList counters;
+    if (control_) {
+        control_->visit_counters(
+            [&](std::string_view name, std::uint64_t value) { counters.emplace_back(name, value); });
+    }
     const auto& status =
-        board_.compose({}, 0, StepTimer::now_ns(CLOCK_MONOTONIC), StepTimer::now_ns(CLOCK_REALTIME) / 1000);
-    if (sender_) sender_->send(channel_, status);
+        board_.compose(counters, 0, StepTimer::now_ns(CLOCK_MONOTONIC), StepTimer::now_ns(CLOCK_REALTIME) / 1000);
+    if (sender_) sender_->send(config_.channel_prefix + "STATUS", status);
 }
 
 }  // namespace dlod::daemon

@@ -5,13 +5,15 @@
 #include <string>
 
 #include "daemon/config/config.hpp"
+#include "daemon/control/remote_control.hpp"
 #include "daemon/publish/lcm_bus.hpp"
 #include "daemon/publish/message_sender.hpp"
 #include "daemon/status/status_board.hpp"
 
 namespace dlod::daemon {
 
-/// The status of a service that has no sensor yet: planners and lcm-spy see that it lives and what it waits for.
+/// The status of a service that has no sensor yet: planners and lcm-spy see that it lives and what it waits for, and
+/// commands are answered.
 class WaitingStatus {
   public:
     /// @param start_ns CLOCK_MONOTONIC of the service's start
@@ -24,11 +26,11 @@ class WaitingStatus {
   private:
     void open_bus();
 
-    std::string url_;
-    std::string channel_;
+    LcmConfig config_;
     std::unique_ptr<LcmBus> bus_;
     std::unique_ptr<MessageSender> sender_;
     StatusBoard board_;
+    std::unique_ptr<RemoteControl> control_;  // last: its thread uses all of the above
 };
 
 }  // namespace dlod::daemon

@@ -67,6 +67,9 @@ MapStore::Result MapStore::save(std::string name, std::vector<CellTable::Entry> 
         OutputFile ply(path.string() + ".ply", OutputFile::Mode::kReplace);
         write_pcd(pcd, map);
         write_ply(ply, map);
+        // What can fail has not failed before either is replaced: they stay a pair.
+        pcd.finish();
+        ply.finish();
         pcd.close();
         ply.close();
         return {true, fmt::format("{}.pcd and .ply: {} points", path.string(), map.size())};

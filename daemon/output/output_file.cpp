@@ -26,15 +26,17 @@ std::filesystem::path path_to_write(const std::filesystem::path& target, OutputF
 OutputFile::OutputFile(std::filesystem::path path, Mode mode)
     : target_(std::move(path)),
       path_(path_to_write(target_, mode)),
-      descriptor_(::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644)) {
+      descriptor_(::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644)),
+      in_place_(mode == Mode::kInPlace) {
     if (descriptor_ < 0) fail(path_, "create the file", errno);
     buffer_.reserve(kBufferBytes);
 }
 
 OutputFile::~OutputFile() {
-    if (path_ != target_ && descriptor_ >= 0) {
-        ::close(std::exchange(descriptor_, -1));
-        ::unlink(path_.c_str());
+    if (replaces()) {
+        if (descriptor_ >= 0) ::close(descriptor_);
+        if (!in_place_) ::unlink(path_.c_str());
+        return;
     }
     try {
         close();
@@ -67,27 +69,29 @@ void OutputFile::write_through(std::span<const std::byte> bytes) {
 }
 
 void OutputFile::close() {
+    finish();
+    if (!in_place_) put_in_place();
+}
+
+void OutputFile::finish() {
     if (descriptor_ < 0) return;
     struct Closer {
-        OutputFile& file;
-        bool done = false;
+        int& descriptor;
         ~Closer() {
-            if (file.descriptor_ >= 0) ::close(file.descriptor_);
-            file.descriptor_ = -1;
-            if (!done && file.path_ != file.target_) ::unlink(file.path_.c_str());
+            if (descriptor >= 0) ::close(std::exchange(descriptor, -1));
         }
-    } closer{*this};
+    } closer{descriptor_};
     flush();
-    if (path_ != target_ && ::fsync(descriptor_) != 0) fail(path_, "write to the disk", errno);
+    if (replaces() && ::fsync(descriptor_) != 0) fail(path_, "write to the disk", errno);
     // Network and quota file systems report a lack of space only here.
     const int descriptor = std::exchange(descriptor_, -1);
     if (::close(descriptor) != 0 && errno != EINTR) fail(path_, "close", errno);
-    if (path_ != target_) put_in_place();
-    closer.done = true;
+    if (replaces() && std::filesystem::is_directory(target_)) fail(target_, "replace the file", EISDIR);
 }
 
 void OutputFile::put_in_place() {
     if (::rename(path_.c_str(), target_.c_str()) != 0) fail(target_, "replace the file", errno);
+    in_place_ = true;
     // The new name, too, is to outlive a loss of power. Where the folder cannot be opened the system sees to it in
     // time.
     const int folder = ::open(target_.parent_path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);

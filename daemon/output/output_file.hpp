@@ -38,15 +38,20 @@ class OutputFile {
     /// failure.
     /// @throws OutputError
     void close();
+    /// Of a file that replaces another, all of close() but the last step, which has next to nothing left to fail by:
+    /// files that belong together are all finished before the first one is closed. @throws OutputError
+    void finish();
 
   private:
     void flush();
     void write_through(std::span<const std::byte> bytes);
     void put_in_place();
+    bool replaces() const { return path_ != target_; }
 
     std::filesystem::path target_;
     std::filesystem::path path_;  ///< what is written: the target, or a file beside it that will replace it
-    int descriptor_;
+    int descriptor_;              ///< -1 once it is closed
+    bool in_place_;
     std::vector<std::byte> buffer_;
 };
 

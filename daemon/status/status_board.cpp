@@ -4,6 +4,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 
 namespace dlod::daemon {
@@ -118,16 +119,17 @@ status_t StatusBoard::answer(const CommandAnswer& answer, std::int64_t utime) {
     return status_;
 }
 
-std::uint64_t StatusBoard::counter(const std::string& name) const {
-    const auto found = counters_.find(name);
-    return found == counters_.end() ? 0 : found->second;
+std::uint64_t StatusBoard::rise(const std::string& name) const {
+    const auto value = [&](const std::map<std::string, std::uint64_t>& counters) {
+        const auto found = counters.find(name);
+        return found == counters.end() ? 0 : found->second;
+    };
+    return std::max(value(counters_), value(previous_counters_)) - value(previous_counters_);
 }
 
 void StatusBoard::compose_rates(std::int64_t now_ns) {
     const double seconds = std::max(1e-9 * static_cast<double>(now_ns - last_compose_ns_), 1e-3);
-    const auto rate = [&](const char* name) {
-        return static_cast<double>(counter(name) - previous_counters_[name]) / seconds;
-    };
+    const auto rate = [&](const char* name) { return static_cast<double>(rise(name)) / seconds; };
     status_.packet_rate = rate("lidar_packets");
     status_.frame_rate = rate("frames");
     status_.pose_rate = static_cast<double>(poses_ - previous_poses_) / seconds;
@@ -150,7 +152,7 @@ void StatusBoard::compose_stages() {
 void StatusBoard::compose_health(std::int64_t last_packet_ns, std::int64_t now_ns) {
     std::string losses;
     for (const Loss& loss : kLosses) {
-        if (counter(loss.counter) > previous_counters_[loss.counter]) rose_ns_[loss.counter] = now_ns;
+        if (rise(loss.counter) > 0) rose_ns_[loss.counter] = now_ns;
         const auto rose = rose_ns_.find(loss.counter);
         if (rose == rose_ns_.end() || now_ns - rose->second > kLossMemory) continue;
         losses += fmt::format("{}{}: {}", losses.empty() ? "" : "; ", loss.counter, loss.remedy);

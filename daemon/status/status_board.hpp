@@ -46,7 +46,8 @@ class StatusBoard {
     void compose_rates(std::int64_t now_ns);
     void compose_stages();
     void compose_health(std::int64_t last_packet_ns, std::int64_t now_ns);
-    std::uint64_t counter(const std::string& name) const;
+    /// By how much a counter is above what it was at the call of compose() before; 0 where it began anew.
+    std::uint64_t rise(const std::string& name) const;
 
     std::int64_t start_ns_;
     std::int64_t last_compose_ns_;

@@ -16,6 +16,8 @@ constexpr int kVisiblePoints = 40;
 constexpr double kGate_m = 1.0;
 constexpr double kBonusOfSameTrack_m = 0.3;
 constexpr double kForbidden = 1e6;
+constexpr double kHalfWay_s = 0.55;
+constexpr double kShortestWay_m = 0.05;  // a shorter way has no direction
 
 struct Match {
     std::size_t object, track;
@@ -155,20 +157,36 @@ class TrackingScorer {
         }
     }
 
-    /// Compares velocity and heading with the object's displacement from the frame before to the frame after.
+    /// Compares velocity and heading with the object's own speed in the direction of its way over a second: box centres
+    /// sway with arms and legs, by more than a pedestrian's speed from frame to frame.
     void add_motion_error(std::size_t j, const TruthObject& object, const Track& track) {
-        const std::size_t before = j > 0 ? j - 1 : j;
-        const std::size_t after = std::min(j + 1, truth_.frames() - 1);
-        const auto find = [&](std::size_t frame) {
+        const Eigen::Vector2d way = way_m(j, object);
+        if (way.norm() < kShortestWay_m) return;
+        motion_errors_.add(track.velocity_mps.head<2>(), object.speed_mps * way.normalized());
+    }
+
+    /// From where the object was half a second before frame j to where it will be half a second after, as far as known.
+    Eigen::Vector2d way_m(std::size_t j, const TruthObject& object) const {
+        const auto stamp = [&](std::size_t frame) { return truth_.last_columns[frame].stamp_s; };
+        const auto find = [&](std::size_t frame) -> const TruthObject* {
             const auto& all = truth_.objects[frame];
-            return std::find_if(all.begin(), all.end(), [&](const TruthObject& o) { return o.id == object.id; });
+            const auto at =
+                std::find_if(all.begin(), all.end(), [&](const TruthObject& o) { return o.id == object.id; });
+            return at == all.end() ? nullptr : &*at;
         };
-        const auto from = find(before);
-        const auto to = find(after);
-        if (after == before || from == truth_.objects[before].end() || to == truth_.objects[after].end()) return;
-        const double seconds = truth_.last_columns[after].stamp_s - truth_.last_columns[before].stamp_s;
-        const Eigen::Vector2d velocity = (to->center_m - from->center_m).head<2>() / seconds;
-        motion_errors_.add(track.velocity_mps.head<2>(), velocity);
+        const TruthObject* from = &object;
+        const TruthObject* to = &object;
+        for (std::size_t k = j; k-- > 0 && stamp(j) - stamp(k) < kHalfWay_s;) {
+            const TruthObject* o = find(k);
+            if (o == nullptr) break;
+            from = o;
+        }
+        for (std::size_t k = j + 1; k < truth_.frames() && stamp(k) - stamp(j) < kHalfWay_s; ++k) {
+            const TruthObject* o = find(k);
+            if (o == nullptr) break;
+            to = o;
+        }
+        return (to->center_m - from->center_m).head<2>();
     }
 
     /// Frames in which objects and tracks are together under the best one-to-one pairing of identities over the run.

@@ -27,7 +27,7 @@ struct TrackingScore {
     std::optional<double> delay_frames_median;
     std::optional<double> delay_frames_p90;
     double centre_error_m = 0.0;
-    /// Of matched tracks, against the objects' displacement over the frames beside; heading only above 0.5 m/s.
+    /// Of matched tracks, against the objects' speed along their way over a second; heading only above 0.5 m/s.
     std::optional<double> velocity_error_mps;
     std::optional<double> heading_error_deg;
     std::vector<MotionErrorRow> motion_errors;  ///< the same over the objects' speed; not visited

@@ -21,6 +21,9 @@ using std::chrono::nanoseconds;
 
 /// The sensor sends nothing for so long before it is back; the robot stands meanwhile.
 constexpr std::int64_t kRestart_ns = 800'000'000;
+/// And then sends for so long, at the least, before the end: whoever waits for a second packet of a new stream before
+/// believing in it has one.
+constexpr std::int64_t kBack_ns = 2'000'000'000;
 constexpr double kBurst_s = 0.15;
 
 int open_socket(const char* address) {
@@ -69,7 +72,11 @@ void FaultySensor::run() {
     });
     const auto laps_between_restarts =
         std::max<std::int64_t>(1, std::llround(options_.restart_every_s * 1e9 / static_cast<double>(lap_ns_)));
-    for (std::int64_t lap = 0; !over(); ++lap) send_lap(lap, (lap + 1) % laps_between_restarts == 0);
+    const auto last_restart_ns = std::llround(1e9 * options_.seconds) - kBack_ns;
+    for (std::int64_t lap = 0; !over(); ++lap) {
+        const bool due = (lap + 1) % laps_between_restarts == 0;
+        send_lap(lap, due && (lap + 1) * lap_ns_ <= last_restart_ns);
+    }
     stopping_ = true;
     stranger.join();
 }

@@ -16,13 +16,7 @@ namespace {
 using namespace std::chrono_literals;
 using test::FakeSensor;
 using test::LiveRun;
-
-test::SyntheticSensor on_live_ports() {
-    test::SyntheticSensor sensor;
-    sensor.lidar_port = test::kLiveLidarPort;
-    sensor.imu_port = test::kLiveImuPort;
-    return sensor;
-}
+using test::on_live_ports;
 
 class Faults : public testing::Test {
   protected:

@@ -24,6 +24,13 @@ inline constexpr const char* kLiveUrl = "udpm://239.255.76.99:17667?ttl=0";
 inline constexpr std::uint16_t kLiveLidarPort = 17502;
 inline constexpr std::uint16_t kLiveImuPort = 17503;
 
+/// A sensor that sends to these ports.
+inline SyntheticSensor on_live_ports(SyntheticSensor sensor = {}) {
+    sensor.lidar_port = kLiveLidarPort;
+    sensor.imu_port = kLiveImuPort;
+    return sensor;
+}
+
 /// In a network namespace of its own where the system allows it. Ask usable() first.
 class LiveRun {
   public:

@@ -4,25 +4,19 @@
 
 #include <chrono>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <vector>
 
 #include "tests/daemon/live/live_run.hpp"
+#include "tests/support/file_content.hpp"
 
 namespace dlod {
 namespace {
 
 using namespace std::chrono_literals;
+using test::content;
 
 constexpr std::size_t kFrames = 40;
-
-std::string content(const std::filesystem::path& file) {
-    std::ifstream stream(file, std::ios::binary);
-    EXPECT_TRUE(stream) << file;
-    return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 /// What was recorded on the way gives the same results again.
 void expect_same_by_replay(const std::filesystem::path& recording, const std::filesystem::path& live) {

@@ -14,13 +14,7 @@ namespace {
 using namespace std::chrono_literals;
 using test::FakeSensor;
 using test::LiveRun;
-using test::SyntheticSensor;
-
-SyntheticSensor on_live_ports(SyntheticSensor sensor = {}) {
-    sensor.lidar_port = test::kLiveLidarPort;
-    sensor.imu_port = test::kLiveImuPort;
-    return sensor;
-}
+using test::on_live_ports;
 
 auto health(std::int8_t health, const std::string& text) {
     return [=](const status_t& status) {

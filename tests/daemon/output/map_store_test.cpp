@@ -7,19 +7,15 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
-#include <iterator>
 #include <set>
 
+#include "tests/support/file_content.hpp"
 #include "tests/support/synthetic_capture.hpp"
 
 namespace dlod::daemon {
 namespace {
 
-std::string content(const std::filesystem::path& file) {
-    std::ifstream stream(file, std::ios::binary);
-    EXPECT_TRUE(stream) << file;
-    return {std::istreambuf_iterator<char>(stream), {}};
-}
+using test::content;
 
 std::set<std::string> files_in(const std::filesystem::path& folder) {
     std::set<std::string> names;
@@ -115,6 +111,21 @@ TEST(MapStore, AFullDiskLeavesWhatWasThere) {
     EXPECT_FALSE(other.ok);
     EXPECT_EQ(content(folder.path() / "a.pcd"), before);
     EXPECT_EQ(files_in(folder.path()), (std::set<std::string>{"a.pcd", "a.ply"})) << "and nothing else";
+}
+
+TEST(MapStore, WhereOneOfTheTwoCannotBeReplacedNeitherIs) {
+    for (const std::string unwritable : {"pcd", "ply"}) {
+        const test::TemporaryFolder folder;
+        const MapStore store({.folder = folder.path().string()});
+        const std::string other = unwritable == "pcd" ? "ply" : "pcd";
+        std::filesystem::create_directory(folder.path() / ("a." + unwritable));
+        std::ofstream(folder.path() / ("a." + other)) << "what was there";
+        const auto result = store.save("a", points(2));
+        EXPECT_FALSE(result.ok);
+        EXPECT_NE(result.text.find("a." + unwritable + ": cannot replace the file"), std::string::npos) << result.text;
+        EXPECT_EQ(content(folder.path() / ("a." + other)), "what was there");
+        EXPECT_EQ(files_in(folder.path()), (std::set<std::string>{"a.pcd", "a.ply"})) << "and nothing else";
+    }
 }
 
 TEST(MapStore, AMapWithoutPointsReplacesNone) {

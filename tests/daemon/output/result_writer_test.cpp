@@ -3,22 +3,17 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <limits>
 
 #include "daemon/output/point_cloud_file.hpp"
+#include "tests/support/file_content.hpp"
 #include "tests/support/synthetic_capture.hpp"
 #include "tests/support/synthetic_frame.hpp"
 
 namespace dlod::daemon {
 namespace {
 
-std::string content(const std::filesystem::path& file) {
-    std::ifstream stream(file, std::ios::binary);
-    EXPECT_TRUE(stream) << file;
-    return {std::istreambuf_iterator<char>(stream), {}};
-}
+using test::content;
 
 TEST(ResultWriter, WritesTheFormatsToTheLetter) {
     const test::TemporaryFolder folder;

@@ -4,18 +4,19 @@
 #include <gtest/gtest.h>
 #include <poll.h>
 
-#include <fstream>
-#include <iterator>
 #include <sstream>
 
 #include "core/dynamic_lidar_odometry.hpp"
 #include "daemon/output/result_writer.hpp"
 #include "driver/paced_source.hpp"
 #include "driver/pcap_source.hpp"
+#include "tests/support/file_content.hpp"
 #include "tests/support/synthetic_capture.hpp"
 
 namespace dlod::daemon {
 namespace {
+
+using test::content;
 
 constexpr int kFrames = 25;
 
@@ -77,12 +78,6 @@ class PipelineTest : public testing::Test {
         EXPECT_EQ(pipeline.dropped_frames(), 0U);
         pipeline.map().finish();
         writer.finish(pipeline.map().points());
-    }
-
-    static std::string content(const std::filesystem::path& file) {
-        std::ifstream stream(file, std::ios::binary);
-        EXPECT_TRUE(stream) << file;
-        return {std::istreambuf_iterator<char>(stream), {}};
     }
 
     /// frames.csv without its columns of times: those from latency_ms on.

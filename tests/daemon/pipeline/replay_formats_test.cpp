@@ -3,19 +3,20 @@
 #include <poll.h>
 
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <vector>
 
 #include "daemon/output/result_writer.hpp"
 #include "daemon/pipeline/pipeline.hpp"
 #include "driver/pcap_source.hpp"
+#include "tests/support/file_content.hpp"
 #include "tests/support/network_bytes.hpp"
 #include "tests/support/synthetic_capture.hpp"
 
 namespace dlod::daemon {
 namespace {
+
+using test::content;
 
 using test::FileKind;
 
@@ -26,11 +27,6 @@ struct Outcome {
     Eigen::Vector3d last_position_m = Eigen::Vector3d::Zero();
     std::string trajectory, labels;
 };
-
-std::string content(const std::filesystem::path& file) {
-    std::ifstream stream(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 Outcome replay(const std::filesystem::path& capture, const driver::SensorInfo& sensor) {
     const test::TemporaryFolder out;

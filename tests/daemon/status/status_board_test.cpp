@@ -41,6 +41,14 @@ TEST_F(StatusBoardTest, RatesAreOverTheTimeSinceTheLastStatus) {
     EXPECT_GT(status.memory, 0);
 }
 
+TEST_F(StatusBoardTest, ACounterThatBeginsAnewGivesNoRate) {
+    at(2.0, {{"lidar_packets", 640}, {"frames", 10}, {"lost_packets", 9}}, 2.0);
+    pose_at(3.0);
+    const auto status = at(3.0, {{"lidar_packets", 64}, {"frames", 1}, {"lost_packets", 1}}, 3.0);
+    EXPECT_EQ(status.packet_rate, 0.0);
+    EXPECT_EQ(status.frame_rate, 0.0);
+}
+
 TEST_F(StatusBoardTest, PercentilesAreOfTheLastFrames) {
     for (int i = 1; i <= 100; ++i) {
         frame_.latency_ms = static_cast<float>(i);
