@@ -1,34 +1,66 @@
 #include "core/segmentation/range_image_segmentation.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <cstring>
 #include <numbers>
-#include <utility>
+#include <numeric>
 
 #include "core/types/multiversion.hpp"
 
 namespace dlod {
 namespace {
 
+constexpr std::size_t kWord = 64;
+constexpr std::size_t kBoundsStep = 4;
+
 DLOD_MULTIVERSION void select_row(int width, const float* __restrict range, const std::uint8_t* __restrict ground,
-                                  float min_range, float max_range, float* __restrict selected,
-                                  std::uint8_t* __restrict used) {
+                                  float min_range, float max_range, float* __restrict selected) {
     for (int c = 0; c < width; ++c) {
         const bool use = (ground[c] == 0) & (range[c] >= min_range) & (range[c] <= max_range);
         selected[c] = use ? range[c] : 0.0F;
-        used[c] = use ? 1 : 0;
     }
 }
 
-/// The angle criterion between corresponding pixels of a and b: far <= ratio * near, which is beta >= theta (see
-/// ratio_of).
-DLOD_MULTIVERSION void connect_row(int width, const float* __restrict a, const float* __restrict b, float ratio,
-                                   float max_step, std::uint8_t* __restrict connected) {
-    for (int c = 0; c < width; ++c) {
-        const float near = a[c] < b[c] ? a[c] : b[c];
-        const float far = a[c] < b[c] ? b[c] : a[c];
-        connected[c] = ((near > 0.0F) & (far <= ratio * near) & (far - near <= max_step)) ? 1 : 0;
+/// Lists the columns of the bits that are set. @return how many there are
+DLOD_MULTIVERSION std::uint32_t list_columns(std::size_t words, const std::uint64_t* __restrict bits,
+                                             std::uint16_t* __restrict columns) {
+    std::uint32_t n = 0;
+    for (std::size_t w = 0; w < words; ++w) {
+        for (std::uint64_t left = bits[w]; left != 0; left &= left - 1)
+            columns[n++] = static_cast<std::uint16_t>(kWord * w + static_cast<std::size_t>(std::countr_zero(left)));
+    }
+    return n;
+}
+
+/// Union-find over runs: the root of a component is its first run. Halves the way on the way.
+inline std::uint32_t find(std::uint32_t* parent, std::uint32_t run) {
+    while (parent[run] != run) {
+        parent[run] = parent[parent[run]];
+        run = parent[run];
+    }
+    return run;
+}
+
+inline void unite(std::uint32_t* parent, std::uint32_t a, std::uint32_t b) {
+    a = find(parent, a);
+    b = find(parent, b);
+    parent[a < b ? b : a] = a < b ? a : b;
+}
+
+/// Unites runs of a row, which are counted from `here` on, with those of the row above, counted from `above` on.
+DLOD_MULTIVERSION void unite_rows(std::size_t words, const std::uint64_t* __restrict joins,
+                                  const std::uint64_t* __restrict begins, const std::uint64_t* __restrict begins_above,
+                                  std::uint32_t here, std::uint32_t above, std::uint32_t* __restrict parent) {
+    const auto count = [](std::uint64_t bits) { return static_cast<std::uint32_t>(std::popcount(bits)); };
+    for (std::size_t w = 0; w < words; ++w) {
+        for (std::uint64_t left = joins[w]; left != 0; left &= left - 1) {
+            const std::uint64_t up_to_column = left ^ (left - 1);
+            unite(parent, above + count(begins_above[w] & up_to_column) - 1,
+                  here + count(begins[w] & up_to_column) - 1);
+        }
+        here += count(begins[w]);
+        above += count(begins_above[w]);
     }
 }
 
@@ -37,179 +69,125 @@ float ratio_of(double alpha_rad, double theta_rad) {
     return static_cast<float>(std::cos(alpha_rad) + std::sin(alpha_rad) / std::tan(theta_rad));
 }
 
-constexpr std::size_t kBoundsStep = 4;
-
 }  // namespace
 
-void RangeImageSegmentation::Bounds::include(const StructuredCloud& cloud, std::size_t pixel) {
-    const float x = cloud.x[pixel], y = cloud.y[pixel];
-    const float point[5] = {x, y, cloud.z[pixel], x + y, x - y};
-    for (int i = 0; i < 5; ++i) {
-        low[i] = point[i] < low[i] ? point[i] : low[i];
-        high[i] = point[i] > high[i] ? point[i] : high[i];
-    }
-    range = std::max(range, cloud.range_m[pixel]);
-}
-
 float RangeImageSegmentation::Bounds::length() const {
-    const auto extent = [this](int i) { return high[i] - low[i]; };
-    return std::max(std::max(extent(0), extent(1)),
-                    std::numbers::sqrt2_v<float> / 2.0F * std::max(extent(3), extent(4)));
+    return std::max(std::max(high[0] - low[0], high[1] - low[1]),
+                    std::numbers::sqrt2_v<float> / 2.0F *
+                        std::max(high_diagonal[0] + high_diagonal[2], high_diagonal[1] + high_diagonal[3]));
 }
 
 RangeImageSegmentation::RangeImageSegmentation(const SensorModel& sensor, const SegmentationConfig& config)
     : sensor_(sensor),
       config_(config),
       ratio_right_(ratio_of(2.0 * std::numbers::pi / sensor.width, config.angle_threshold_rad)),
-      range_(sensor.height, sensor.width) {
-    const auto width = static_cast<std::size_t>(sensor.width);
-    for (std::size_t r = 0; r + 1 < static_cast<std::size_t>(sensor.height); ++r) {
+      links_(sensor.width) {
+    ratio_down_.push_back(1.0F);  // there is no row above the first
+    for (std::size_t r = 1; r < static_cast<std::size_t>(sensor.height); ++r) {
         const double alpha =
-            std::abs(static_cast<double>(sensor.altitude_rad[r]) - static_cast<double>(sensor.altitude_rad[r + 1]));
+            std::abs(static_cast<double>(sensor.altitude_rad[r - 1]) - static_cast<double>(sensor.altitude_rad[r]));
         ratio_down_.push_back(ratio_of(alpha, config.angle_threshold_rad));
     }
-    right_.assign(width, 0);
-    down_.assign(width, 0);
-    used_.assign(width, 0);
-    runs_.reserve(sensor.pixels());
-    points_.reserve(sensor.pixels());
-    next_pixel_.reserve(4096);
-    last_row_.reserve(4096);
-    bounds_.reserve(4096);
-}
-
-std::uint32_t RangeImageSegmentation::find(std::uint32_t run) {
-    while (runs_[run].parent != run) {
-        runs_[run].parent = runs_[runs_[run].parent].parent;
-        run = runs_[run].parent;
-    }
-    return run;
-}
-
-void RangeImageSegmentation::unite(std::uint32_t a, std::uint32_t b) {
-    a = find(a);
-    b = find(b);
-    if (a == b) return;
-    if (b < a) std::swap(a, b);
-    runs_[b].parent = a;
+    row_begin_.assign(static_cast<std::size_t>(sensor.height) + 1, 0);
+    for (auto* v : {&first_, &last_}) v->assign(sensor.pixels(), 0);
+    for (auto* v : {&parent_, &label_, &points_}) v->assign(sensor.pixels(), 0);
+    growing_.reserve(4096);
 }
 
 void RangeImageSegmentation::connect(const Frame& frame) {
-    const int width = sensor_.width;
     const auto max_step = static_cast<float>(config_.max_depth_step_m);
-    runs_.clear();
-    std::uint32_t above_begin = 0;
+    const std::size_t words = links_.begins().size();
+    std::uint32_t runs = 0;
+    links_.begin();
     for (int r = 0; r < sensor_.height; ++r) {
-        float* range = range_.row(r);
-        select_row(width, frame.cloud.range_m.row(r), frame.prepared.ground.row(r),
-                   static_cast<float>(config_.min_range_m), static_cast<float>(config_.max_range_m), range,
-                   used_.data());
-        connect_row(width - 1, range, range + 1, ratio_right_, max_step, right_.data());
-        connect_row(1, range + width - 1, range, ratio_right_, max_step, right_.data() + width - 1);
-        const auto row_begin = static_cast<std::uint32_t>(runs_.size());
-        find_runs(r);
-        const auto row_end = static_cast<std::uint32_t>(runs_.size());
-        if (right_.back() != 0) unite(row_begin, row_end - 1);
-        if (r > 0) {
-            connect_row(width, range_.row(r - 1), range, ratio_down_[static_cast<std::size_t>(r - 1)], max_step,
-                        down_.data());
-            unite_rows(above_begin, row_begin, row_end);
-        }
-        above_begin = row_begin;
+        select_row(sensor_.width, frame.cloud.range_m.row(r), frame.prepared.ground.row(r),
+                   static_cast<float>(config_.min_range_m), static_cast<float>(config_.max_range_m), links_.next_row());
+        const auto row = static_cast<std::size_t>(r);
+        links_.advance(ratio_right_, ratio_down_[row], max_step);
+        const std::uint32_t row_begin = runs;
+        runs += list_columns(words, links_.begins().data(), first_.data() + row_begin);
+        list_columns(words, links_.ends().data(), last_.data() + row_begin);
+        std::iota(parent_.data() + row_begin, parent_.data() + runs, row_begin);
+        row_begin_[row] = row_begin;
+        row_begin_[row + 1] = runs;
+        if (links_.wraps()) unite(parent_.data(), row_begin, runs - 1);
+        unite_rows(words, links_.joins().data(), links_.begins().data(), links_.begins_above().data(), row_begin,
+                   row_begin_[row - (r > 0 ? 1 : 0)], parent_.data());
     }
 }
 
-void RangeImageSegmentation::find_runs(int row) {
-    const auto width = static_cast<std::size_t>(sensor_.width);
-    const auto first_of = [](const std::uint8_t* begin, std::uint8_t value, std::size_t n) {
-        const void* found = std::memchr(begin, value, n);
-        return found != nullptr ? static_cast<std::size_t>(static_cast<const std::uint8_t*>(found) - begin) : n;
-    };
-    for (std::size_t c = 0; c < width; ++c) {
-        c += first_of(&used_[c], 1, width - c);
-        if (c == width) return;
-        const std::size_t last = std::min(c + first_of(&right_[c], 0, width - c), width - 1);
-        runs_.push_back({static_cast<std::uint32_t>(runs_.size()), 0, static_cast<std::uint16_t>(row),
-                         static_cast<std::uint16_t>(c), static_cast<std::uint16_t>(last)});
-        c = last;
-    }
-}
-
-void RangeImageSegmentation::unite_rows(std::uint32_t above, std::uint32_t here, std::uint32_t end) {
-    const std::uint32_t above_end = here;
-    while (above < above_end && here < end) {
-        const Run& a = runs_[above];
-        const Run& b = runs_[here];
-        const std::uint16_t first = std::max(a.first, b.first);
-        const std::uint16_t last = std::min(a.last, b.last);
-        if (first <= last && std::memchr(&down_[first], 1, static_cast<std::size_t>(last - first) + 1) != nullptr) {
-            unite(above, here);
-        }
-        if (runs_[above].last < runs_[here].last) {
-            ++above;
-        } else {
-            ++here;
-        }
-    }
-}
-
-void RangeImageSegmentation::collect(Preparation& prepared, const StructuredCloud& cloud) {
-    points_.assign(runs_.size(), 0);
-    for (std::uint32_t i = 0; i < runs_.size(); ++i) {
-        runs_[i].parent = find(i);
-        points_[runs_[i].parent] += static_cast<std::uint32_t>(runs_[i].last - runs_[i].first) + 1U;
+void RangeImageSegmentation::number_segments(Preparation& prepared) {
+    const std::uint32_t runs = row_begin_.back();
+    std::fill_n(points_.begin(), runs, 0U);
+    for (std::uint32_t i = 0; i < runs; ++i) {
+        parent_[i] = parent_[parent_[i]];  // the root: that of an earlier run is known
+        points_[parent_[i]] += static_cast<std::uint32_t>(last_[i] - first_[i]) + 1U;
     }
     prepared.segments.clear();
-    prepared.segment.fill(0);
-    next_pixel_.clear();
     std::uint32_t pixels = 0;
-    for (std::uint32_t i = 0; i < runs_.size(); ++i) {
-        if (runs_[i].parent != i || points_[i] < static_cast<std::uint32_t>(config_.min_points)) continue;
+    for (std::uint32_t i = 0; i < runs; ++i) {
+        label_[i] = label_[parent_[i]];
+        if (parent_[i] != i) continue;
+        label_[i] = 0;
+        if (points_[i] < static_cast<std::uint32_t>(config_.min_points)) continue;
         Segment& segment = prepared.segments.emplace_back();
         segment.first = pixels;
         segment.count = points_[i];
-        runs_[i].segment = static_cast<std::uint32_t>(prepared.segments.size());
-        next_pixel_.push_back(pixels);
+        label_[i] = static_cast<std::uint32_t>(prepared.segments.size());
         pixels += points_[i];
     }
     prepared.pixels.resize(pixels);
-    // Runs come in row order: a segment's row is new where it differs from its last one.
-    last_row_.assign(prepared.segments.size(), ~0U);
-    bounds_.assign(prepared.segments.size(), {});
-    for (const Run& run : runs_) {
-        const std::uint32_t label = runs_[run.parent].segment;
-        if (label == 0) continue;
-        Segment& segment = prepared.segments[label - 1];
-        if (last_row_[label - 1] != run.row) {
-            last_row_[label - 1] = run.row;
-            ++segment.rows;
+}
+
+void RangeImageSegmentation::collect(Preparation& prepared, const StructuredCloud& cloud) {
+    const auto include = [&cloud](Bounds& bounds, std::size_t pixel) {
+        const float x = cloud.x[pixel], y = cloud.y[pixel];
+        const Eigen::Array4f point(x, y, cloud.z[pixel], cloud.range_m[pixel]);
+        bounds.low = bounds.low.min(point);
+        bounds.high = bounds.high.max(point);
+        bounds.high_diagonal = bounds.high_diagonal.max(Eigen::Array4f(x, x, -x, -x) + Eigen::Array4f(y, -y, -y, y));
+    };
+    growing_.assign(prepared.segments.size(), {});
+    for (std::size_t s = 0; s < growing_.size(); ++s) growing_[s].next_pixel = prepared.segments[s].first;
+    for (int r = 0; r < sensor_.height; ++r) {
+        std::uint32_t* labels = prepared.segment.row(r);
+        std::fill_n(labels, sensor_.width, 0U);
+        const auto begin = static_cast<std::size_t>(r) * static_cast<std::size_t>(sensor_.width);
+        const auto row = static_cast<std::size_t>(r);
+        for (std::uint32_t i = row_begin_[row]; i < row_begin_[row + 1]; ++i) {
+            const std::uint32_t label = label_[i];
+            if (label == 0) continue;
+            Growing& segment = growing_[label - 1];
+            if (segment.last_row != r) {
+                segment.last_row = r;
+                ++segment.rows;
+            }
+            const std::size_t count = static_cast<std::size_t>(last_[i] - first_[i]) + 1;
+            std::fill_n(labels + first_[i], count, label);
+            PixelIndex* pixels = &prepared.pixels[segment.next_pixel];
+            std::iota(pixels, pixels + count, static_cast<PixelIndex>(begin + first_[i]));
+            segment.next_pixel += static_cast<std::uint32_t>(count);
+            // Both ends and every few pixels between: the cost counts, the millimetres do not.
+            const std::size_t last = last_[i];
+            for (std::size_t c = first_[i]; c < last + kBoundsStep; c += kBoundsStep)
+                include(segment.bounds, begin + std::min(c, last));
         }
-        const std::size_t begin = static_cast<std::size_t>(run.row) * static_cast<std::size_t>(sensor_.width);
-        std::uint32_t next = next_pixel_[label - 1];
-        const std::size_t end = begin + run.last + 1;
-        for (std::size_t p = begin + run.first; p < end; ++p) {
-            prepared.segment[p] = label;
-            prepared.pixels[next++] = static_cast<PixelIndex>(p);
-        }
-        // Bounds from both ends of the run and every few pixels between: the cost counts, the millimetres do not.
-        Bounds& bounds = bounds_[label - 1];
-        for (std::size_t p = begin + run.first; p < end; p += kBoundsStep) bounds.include(cloud, p);
-        bounds.include(cloud, end - 1);
-        next_pixel_[label - 1] = next;
     }
-    for (std::size_t i = 0; i < prepared.segments.size(); ++i) {
-        Segment& segment = prepared.segments[i];
-        const Bounds& bounds = bounds_[i];
-        segment.min_m = {bounds.low[0], bounds.low[1], bounds.low[2]};
-        segment.max_m = {bounds.high[0], bounds.high[1], bounds.high[2]};
+    for (std::size_t s = 0; s < growing_.size(); ++s) {
+        Segment& segment = prepared.segments[s];
+        const Bounds& bounds = growing_[s].bounds;
+        segment.rows = growing_[s].rows;
+        segment.min_m = bounds.low.head<3>();
+        segment.max_m = bounds.high.head<3>();
         segment.length_m = bounds.length();
-        segment.max_range_m = bounds.range;
+        segment.max_range_m = bounds.high[3];
         segment.feasible = is_feasible(segment, config_.feasibility);
     }
 }
 
 void RangeImageSegmentation::process(Frame& frame) {
     connect(frame);
+    number_segments(frame.prepared);
     collect(frame.prepared, frame.cloud);
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/segmentation/feasibility.hpp"
+#include "core/segmentation/row_links.hpp"
 #include "core/types/frame.hpp"
 #include "core/types/parameter.hpp"
 
@@ -44,44 +45,42 @@ class RangeImageSegmentation {
     void process(Frame& frame);
 
   private:
-    /// Connected pixels of one row, columns [first, last].
-    struct Run {
-        std::uint32_t parent;   ///< in the union-find; the root is a component's first run
-        std::uint32_t segment;  ///< of the root: 1 + index of the segment, 0 none
-        std::uint16_t row, first, last;
-    };
-
     /// Of a segment.
     struct Bounds {
-        // Along x, y, z and the diagonals x + y, x - y (longer by the root of 2).
-        float low[5] = {1e9F, 1e9F, 1e9F, 1e9F, 1e9F};
-        float high[5] = {-1e9F, -1e9F, -1e9F, -1e9F, -1e9F};
-        float range = 0.0F;
-        void include(const StructuredCloud& cloud, std::size_t pixel);
+        Eigen::Array4f low = Eigen::Array4f::Constant(1e9F);             ///< x, y, z, range
+        Eigen::Array4f high = Eigen::Array4f::Constant(-1e9F);           ///< likewise
+        Eigen::Array4f high_diagonal = Eigen::Array4f::Constant(-1e9F);  ///< x + y, x - y and their negatives
+
         float length() const;
     };
 
-    std::uint32_t find(std::uint32_t run);
-    void unite(std::uint32_t a, std::uint32_t b);
+    /// A segment while its runs are collected.
+    struct Growing {
+        Bounds bounds;
+        std::uint32_t next_pixel = 0;
+        int last_row = -1;
+        std::uint16_t rows = 0;
+    };
+
+    /// Finds the runs and their union-find.
     void connect(const Frame& frame);
-    void find_runs(int row);
-    /// Unites the runs of a row, [here, end), with those of the row above, [above, here).
-    void unite_rows(std::uint32_t above, std::uint32_t here, std::uint32_t end);
+    /// Numbers the components that are large enough.
+    void number_segments(Preparation& prepared);
+    /// Fills the image, the pixel lists and the segments' properties.
     void collect(Preparation& prepared, const StructuredCloud& cloud);
 
     SensorModel sensor_;
     SegmentationConfig config_;
-    float ratio_right_ = 0.0F;           ///< largest ratio of ranges of connected horizontal neighbours
-    AlignedVector<float> ratio_down_;    ///< [H - 1] likewise of row r and r + 1
-    Image<float> range_;                 ///< of the pixels that are segmented, 0 elsewhere
-    AlignedVector<std::uint8_t> used_;   ///< [W] 1: the pixel is segmented
-    AlignedVector<std::uint8_t> right_;  ///< [W] 1: connected to the right neighbour (wrapped)
-    AlignedVector<std::uint8_t> down_;   ///< [W] 1: the pixel above is connected to this one
-    std::vector<Run> runs_;
-    std::vector<std::uint32_t> points_;      ///< of the component, by root run
-    std::vector<std::uint32_t> next_pixel_;  ///< by segment
-    std::vector<Bounds> bounds_;             ///< by segment
-    std::vector<std::uint32_t> last_row_;    ///< by segment
+    float ratio_right_ = 0.0F;         ///< largest ratio of ranges of connected horizontal neighbours
+    AlignedVector<float> ratio_down_;  ///< [H] likewise of row r - 1 and r
+    RowLinks links_;
+    // Runs of connected pixels of one row, in row-major order; arrays hold at most a run a pixel.
+    std::vector<std::uint32_t> row_begin_;     ///< [H + 1] first run of each row
+    std::vector<std::uint16_t> first_, last_;  ///< columns
+    std::vector<std::uint32_t> parent_;        ///< in the union-find; the root is a component's first run
+    std::vector<std::uint32_t> label_;         ///< 1 + index of the segment, 0 none
+    std::vector<std::uint32_t> points_;        ///< of the component, by root run
+    std::vector<Growing> growing_;             ///< by segment
 };
 
 }  // namespace dlod
