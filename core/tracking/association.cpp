@@ -139,15 +139,19 @@ bool Association::near(std::span<const ExpectedTrack> tracks, std::span<const Ca
 
 const std::vector<int>& Association::solve(std::span<const ExpectedTrack> tracks,
                                            std::span<const CandidateDetection> detections,
-                                           const AssociationConfig& config) {
+                                           const AssociationConfig& config, std::span<const int> known) {
     detection_of_.assign(tracks.size(), -1);
     track_of_.assign(detections.size(), -1);
+    for (std::size_t d = 0; d < known.size(); ++d) {
+        if (known[d] >= 0) match(known[d], static_cast<int>(d));
+    }
     set_reaches(tracks, detections, config);
 
     pairs_.clear();
     for (std::size_t t = 0; t < tracks.size(); ++t) {
+        if (detection_of_[t] >= 0) continue;
         for (std::size_t d = 0; d < detections.size(); ++d) {
-            if (!near(tracks, detections, t, d)) continue;
+            if (track_of_[d] >= 0 || !near(tracks, detections, t, d)) continue;
             const ExpectedTrack& track = tracks[t];
             const CandidateDetection& detection = detections[d];
             const Comparison boxes = compare(track, detection, config);
@@ -183,6 +187,11 @@ const std::vector<int>& Association::solve(std::span<const ExpectedTrack> tracks
     return detection_of_;
 }
 
+void Association::match(int track, int detection) {
+    detection_of_[static_cast<std::size_t>(track)] = detection;
+    track_of_[static_cast<std::size_t>(detection)] = track;
+}
+
 // Pairs that share neither a track nor a detection, directly or by others, do not compete: each group of competitors is
 // solved by itself, which keeps the cubic method to a handful of rows.
 void Association::assign(std::size_t tracks, std::size_t detections, double unmatched_cost) {
@@ -209,10 +218,6 @@ void Association::assign(std::size_t tracks, std::size_t detections, double unma
 }
 
 void Association::assign_component(std::size_t first, std::size_t last, double unmatched_cost) {
-    const auto match = [&](int track, int detection) {
-        detection_of_[static_cast<std::size_t>(track)] = detection;
-        track_of_[static_cast<std::size_t>(detection)] = track;
-    };
     if (last - first == 1) {
         match(pairs_[first].track, pairs_[first].detection);
         return;

@@ -19,7 +19,7 @@ struct ExpectedTrack {
     bool steady = false;                   ///< seen often enough to believe in it as an object of its own
     bool established = false;              ///< seen so often that younger tracks give way
     double dt_s = 0.0;                     ///< since it was last seen
-    double motion = 0.0;                   ///< belief that it moves: -1 (static) .. 1 (moving)
+    double motion = 0.0;  ///< belief that it moves: -1 (static) .. 1 (moving)
 };
 
 /// A detection as the association sees it.
@@ -35,9 +35,13 @@ struct CandidateDetection {
 /// distance to the predicted position. Keeps its memory.
 class Association {
   public:
+    /// @param known track of each detection where it is known already, -1 where not; may be shorter
     /// @return the detection of each track, -1 for none; valid until the next call
     const std::vector<int>& solve(std::span<const ExpectedTrack> tracks, std::span<const CandidateDetection> detections,
-                                  const AssociationConfig& config);
+                                  const AssociationConfig& config, std::span<const int> known = {});
+
+    /// What the last call returned.
+    const std::vector<int>& last() const { return detection_of_; }
 
     /// Eq. 5: alpha (1 - IoU) + beta (1 - min / max of the point counts).
     static double cost(double iou, int points_a, int points_b, const AssociationConfig& config);
@@ -53,6 +57,7 @@ class Association {
     /// False where a pair is surely beyond the gate.
     bool near(std::span<const ExpectedTrack> tracks, std::span<const CandidateDetection> detections, std::size_t t,
               std::size_t d) const;
+    void match(int track, int detection);
     void assign(std::size_t tracks, std::size_t detections, double unmatched_cost);
     void assign_component(std::size_t first, std::size_t last, double unmatched_cost);
 

@@ -10,11 +10,15 @@ namespace dlod {
 
 namespace {
 
-constexpr double kInside_m = 0.15;     // the middle of a covered track lies at most this far outside of the detection
-constexpr double kLonger = 1.1;        // a detection of several objects is so much longer than each
-constexpr double kSameObject = 0.35;   // tracks that share more of their footprints are one object seen twice
-constexpr double kMinPart = 10;        // pixels of each part
-constexpr double kMinShare = 0.25;     // of those that its track had: it was not hidden meanwhile
+constexpr double kInside_m = 0.15;    // the middle of a covered track lies at most this far outside of the detection
+constexpr double kLonger = 1.1;       // a detection of several objects is so much longer than each
+constexpr double kSameObject = 0.35;  // tracks that share more of their footprints are one object seen twice
+constexpr double kMinPart = 10;       // pixels of each part
+constexpr double kMinShare = 0.25;    // of those that its track had: it was not hidden meanwhile
+constexpr double kSeenShare = 0.5;    // of a track's pixels: there it is, if not whole
+constexpr double kLargestBody_m = 1.5;
+constexpr double kLeastHeight = 0.6;   // of the tallest: a lower one may be a limb of it
+constexpr int kRounds = 3;             // of sharing by middles
 constexpr double kMoving = 0.5;        // belief from which a track is worth being cut out
 constexpr double kSameSize = 1.3;      // footprint diagonals up to that ratio
 constexpr double kSameSize_m = 0.5;    // and that much more may be the track's
@@ -39,22 +43,34 @@ bool covers(const Detection& detection, const OrientedBox& box) {
            std::abs(detection.box.center_m.z() - box.center_m.z()) < 0.5 * (detection.box.size_m.z() + box.size_m.z());
 }
 
+/// It is far larger than the track's object.
+bool outgrows(const Detection& detection, const ExpectedTrack& track) {
+    return detection.box.size_m.head<2>().norm() >= kSameSize * track.whole.size_m.head<2>().norm() + kSameSize_m;
+}
+
 bool same_object(const OrientedBox& a, const OrientedBox& b) {
     return footprint_intersection_m2(a, b) > kSameObject * std::min(area(a), area(b));
 }
 
 }  // namespace
 
-void MergedDetections::divide(Frame& frame, DetectionShapes& shapes, std::span<const ExpectedTrack> tracks) {
+bool MergedDetections::divide(Frame& frame, DetectionShapes& shapes, std::span<const ExpectedTrack> tracks,
+                              std::span<const int> detection_of) {
     const std::size_t count = frame.detection.detections.size();
     cut_.clear();
     apart_.clear();
+    known_.assign(count, -1);
+    const auto seen_elsewhere = [&](std::size_t t, std::size_t detection) {
+        const int d = detection_of[t];
+        return d >= 0 && static_cast<std::size_t>(d) != detection &&
+               frame.detection.detections[static_cast<std::size_t>(d)].count > kSeenShare * tracks[t].points;
+    };
     for (std::size_t i = 0; i < count; ++i) {
         const Detection& detection = frame.detection.detections[i];
         covered_.clear();
         double longest = 0.0;
         for (std::size_t t = 0; t < tracks.size(); ++t) {
-            if (!tracks[t].steady || !covers(detection, tracks[t].visible)) continue;
+            if (!tracks[t].steady || !covers(detection, tracks[t].visible) || seen_elsewhere(t, i)) continue;
             const bool twice = std::any_of(covered_.begin(), covered_.end(), [&](std::size_t other) {
                 return same_object(tracks[t].visible, tracks[other].visible);
             });
@@ -71,11 +87,20 @@ void MergedDetections::divide(Frame& frame, DetectionShapes& shapes, std::span<c
             std::any_of(covered_.begin(), covered_.end(), [&](std::size_t t) { return tracks[t].motion > kMoving; });
         const bool apart = !divided && !cut && covered_.size() == 1 && moves && fall_apart(detection, shapes, i);
         if (!divided && !cut && !apart) continue;
+        const std::size_t next = frame.detection.detections.size();
         divide_one(frame, shapes, i);
-        if (!apart) continue;
-        apart_.push_back(i);
-        apart_.push_back(frame.detection.detections.size() - 1);
+        known_.resize(frame.detection.detections.size(), -1);
+        for (std::size_t k = 0; divided && bodies_ && k < covered_.size(); ++k) {
+            const std::size_t part = k == 0 ? i : next + k - 1;
+            if (!outgrows(frame.detection.detections[part], tracks[covered_[k]]))
+                known_[part] = static_cast<int>(covered_[k]);
+        }
+        if (apart) {
+            apart_.push_back(i);
+            apart_.push_back(next);
+        }
     }
+    return frame.detection.detections.size() > count;
 }
 
 bool MergedDetections::share_out(const Detection& whole, const DetectionShapes& shapes,
@@ -97,6 +122,14 @@ bool MergedDetections::share_out(const Detection& whole, const DetectionShapes& 
         }
         ++counts_[owner_[i]];
     }
+    double tallest_m = 0.0;
+    for (const std::size_t t : covered_) tallest_m = std::max(tallest_m, tracks[t].whole.size_m.z());
+    const bool small = whole.box.size_m.head<2>().maxCoeff() < kLargestBody_m * static_cast<double>(covered_.size());
+    bodies_ = small && std::all_of(covered_.begin(), covered_.end(), [&](std::size_t t) {
+                  const Eigen::Vector3d size = tracks[t].whole.size_m;
+                  return size.head<2>().maxCoeff() < kLargestBody_m && size.z() > kLeastHeight * tallest_m;
+              });
+    for (int k = 0; bodies_ && k < kRounds; ++k) share_by_middles(whole, shapes);
     for (std::size_t k = 0; k < covered_.size(); ++k) {
         const double expected = kMinShare * tracks[covered_[k]].points;
         if (static_cast<double>(counts_[k]) < std::max(kMinPart, expected)) return false;
@@ -104,10 +137,42 @@ bool MergedDetections::share_out(const Detection& whole, const DetectionShapes& 
     return true;
 }
 
+// Where they were expected decides who is who, but the points themselves say where each of them is.
+void MergedDetections::share_by_middles(const Detection& whole, const DetectionShapes& shapes) {
+    const PointSpan points = shapes.points(whole);
+    const auto waist_m = static_cast<float>(whole.box.center_m.z() - shapes.origin().z());
+    middles_.assign(counts_.size(), {});
+    for (std::size_t i = 0; i < whole.count; ++i) {
+        if (points.z[i] < waist_m) continue;  // legs swing
+        Middle& m = middles_[owner_[i]];
+        m.x += points.x[i];
+        m.y += points.y[i];
+        m.count += 1.0F;
+    }
+    for (Middle& m : middles_) {
+        if (m.count < static_cast<float>(kMinPart)) return;
+        m.x /= m.count;
+        m.y /= m.count;
+    }
+    counts_.assign(counts_.size(), 0);
+    for (std::size_t i = 0; i < whole.count; ++i) {
+        float best = 0.0F;
+        for (std::size_t k = 0; k < middles_.size(); ++k) {
+            const float dx = points.x[i] - middles_[k].x, dy = points.y[i] - middles_[k].y;
+            const float d2 = dx * dx + dy * dy;
+            if (k == 0 || d2 < best) {
+                best = d2;
+                owner_[i] = k;
+            }
+        }
+        ++counts_[owner_[i]];
+    }
+}
+
 bool MergedDetections::cut_out(const Detection& whole, const DetectionShapes& shapes, const ExpectedTrack& track) {
     if (track.motion < kMoving) return false;
     OrientedBox box = track.whole;
-    if (whole.box.size_m.head<2>().norm() < kSameSize * box.size_m.head<2>().norm() + kSameSize_m) return false;
+    if (!outgrows(whole, track)) return false;
     // More of a long object may come into view at its ends.
     box.size_m.x() += box.size_m.x() > kLong_m ? 2.0 * kLongMargin_m : 2.0 * kMargin_m;
     box.size_m.y() += 2.0 * kMargin_m;

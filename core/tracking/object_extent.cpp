@@ -12,6 +12,8 @@ constexpr double kOblique = 0.35;  // sine of 20 degrees: a side seen flatter th
 constexpr double kLimb = 0.25;     // of the difference to the remembered size
 constexpr double kCarWidth_m = 1.8;
 constexpr double kWidest_m = 3.2;  // vehicles
+constexpr double kLimbs_m = 2.0;   // what is smaller may have limbs: a low or narrow piece of it may be one
+constexpr double kMostOfIt = 0.5;  // of its height must be seen for its ends to be seen
 constexpr double kLongest_m = 25.0;
 constexpr double kVehicleLength_m = 4.0;   // of the smaller cars
 constexpr double kVehicleWidth_m = 1.4;    // what is as wide as that
@@ -82,17 +84,22 @@ CompletedSide complete_side(double center_m, double visible_m, double before_m, 
 }  // namespace
 
 ExtentMeasurement complete_extent(const OrientedBox& visible, const Eigen::Vector3d& before_m,
-                                  const OrientedBox& remembered, const Visibility& visibility,
+                                  const OrientedBox& remembered, const Visibility& visibility, bool moves,
                                   const KalmanConfig& config) {
     const Eigen::Vector2d along(std::cos(visible.yaw_rad), std::sin(visible.yaw_rad));
     const Eigen::Vector2d across(-along.y(), along.x());
     const Eigen::Vector2d offset = (visible.center_m - remembered.center_m).head<2>();
-    const CompletedSide length = complete_side(
-        along.dot(offset), visible.size_m.x(), before_m.x(), remembered.size_m.x(),
-        longest_side(remembered.size_m.x(), remembered.size_m.y()), hidden_ends(along, visible, visibility), config);
-    const CompletedSide width = complete_side(
-        across.dot(offset), visible.size_m.y(), before_m.y(), remembered.size_m.y(),
-        longest_side(remembered.size_m.y(), remembered.size_m.x()), hidden_ends(across, visible, visibility), config);
+    const bool piece = moves && remembered.size_m.head<2>().maxCoeff() < kLimbs_m &&
+                       visible.size_m.z() < kMostOfIt * remembered.size_m.z();
+    const auto ends = [&](const Eigen::Vector2d& axis) {
+        return piece ? HiddenEnds{true, true} : hidden_ends(axis, visible, visibility);
+    };
+    const CompletedSide length =
+        complete_side(along.dot(offset), visible.size_m.x(), before_m.x(), remembered.size_m.x(),
+                      longest_side(remembered.size_m.x(), remembered.size_m.y()), ends(along), config);
+    const CompletedSide width =
+        complete_side(across.dot(offset), visible.size_m.y(), before_m.y(), remembered.size_m.y(),
+                      longest_side(remembered.size_m.y(), remembered.size_m.x()), ends(across), config);
     ExtentMeasurement out;
     out.growth = {length.growth_high_m, length.growth_low_m, width.growth_high_m, width.growth_low_m};
     BoxMeasurement& m = out.box;
@@ -102,9 +109,13 @@ ExtentMeasurement complete_extent(const OrientedBox& visible, const Eigen::Vecto
     m.box.size_m.y() = width.size_m;
     m.plane_covariance = length.position_sd_m * length.position_sd_m * along * along.transpose() +
                          width.position_sd_m * width.position_sd_m * across * across.transpose();
-    m.z_sd_m = config.position_sd_m + 0.25 * std::abs(remembered.size_m.z() - visible.size_m.z());
+    // What is lower than an object that moves is some part of it; of what rests, more may be another thing's.
+    const double hidden_m = moves ? std::max(0.0, remembered.size_m.z() - visible.size_m.z()) : 0.0;
+    const double above_m = visible.center_m.z() - remembered.center_m.z();
+    m.box.center_m.z() -= std::clamp(above_m, -0.5 * hidden_m, 0.5 * hidden_m);
+    m.z_sd_m = config.position_sd_m + 0.25 * std::abs(remembered.size_m.z() - visible.size_m.z()) + 0.25 * hidden_m;
     m.yaw_sd_rad = kNotSeen;
-    m.size_sd_m = Eigen::Vector3d(length.size_sd_m, width.size_sd_m, config.size_sd_m);
+    m.size_sd_m = Eigen::Vector3d(length.size_sd_m, width.size_sd_m, config.size_sd_m + hidden_m);
     // So is what is seen: merged with something else, it says little of the object.
     const double excess = visible.size_m.head<2>().minCoeff() - kWidest_m;
     if (excess > 0.0) {
@@ -114,11 +125,11 @@ ExtentMeasurement complete_extent(const OrientedBox& visible, const Eigen::Vecto
     return out;
 }
 
-Growth assumed_growth(const OrientedBox& box, double speed_mps, const Visibility& visibility) {
+Growth assumed_growth(const OrientedBox& box, double visible_width_m, double speed_mps, const Visibility& visibility) {
     const Eigen::Vector2d along(std::cos(box.yaw_rad), std::sin(box.yaw_rad));
     const Eigen::Vector2d across(-along.y(), along.x());
     const double length = box.size_m.x(), width = box.size_m.y();
-    const bool vehicle = speed_mps > kVehicleSpeed_mps && width > kVehicleWidth_m;
+    const bool vehicle = speed_mps > kVehicleSpeed_mps && std::min(width, visible_width_m) > kVehicleWidth_m;
     const double missing_length = (vehicle ? kVehicleLength_m : std::min(0.5 * width, kCarWidth_m)) - length;
     const double missing_width = std::min(0.5 * length, kCarWidth_m) - width;
     Growth growth;
@@ -131,6 +142,18 @@ Growth assumed_growth(const OrientedBox& box, double speed_mps, const Visibility
         if (ends.high != ends.low) (ends.high ? growth.left : growth.right) = missing_width;
     }
     return growth;
+}
+
+Growth surplus(const OrientedBox& remembered, const OrientedBox& part) {
+    const Eigen::Vector2d along(std::cos(remembered.yaw_rad), std::sin(remembered.yaw_rad));
+    const Eigen::Vector2d across(-along.y(), along.x());
+    const Eigen::Vector2d offset = (part.center_m - remembered.center_m).head<2>();
+    const auto beyond = [](double at, double part_m, double remembered_m) {
+        return std::min(0.0, at + 0.5 * (part_m - remembered_m));
+    };
+    const double length = remembered.size_m.x(), width = remembered.size_m.y();
+    return {beyond(along.dot(offset), part.size_m.x(), length), beyond(-along.dot(offset), part.size_m.x(), length),
+            beyond(across.dot(offset), part.size_m.y(), width), beyond(-across.dot(offset), part.size_m.y(), width)};
 }
 
 OrientedBox assumed_box(const OrientedBox& visible, const Visibility& visibility) {

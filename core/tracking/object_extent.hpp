@@ -28,15 +28,22 @@ struct ExtentMeasurement {
 /// from end to end is measured. Where more of an object comes into view than was known it has grown at its hidden end:
 /// that moves its middle, but is no motion. Yaw noise is left at "not seen".
 /// @param visible at the yaw of `remembered`
+/// @param moves the object is known to move: what is low may be a limb of it, its height is remembered
 /// @param before_m size of the visible box of the sighting before: growth must be seen twice
 ExtentMeasurement complete_extent(const OrientedBox& visible, const Eigen::Vector3d& before_m,
-                                  const OrientedBox& remembered, const Visibility& visibility,
+                                  const OrientedBox& remembered, const Visibility& visibility, bool moves,
                                   const KalmanConfig& config);
 
 /// What is missing from a moving object that has been seen from one side only, at the ends that hide: nothing is flat,
 /// and what is as wide and as fast as a vehicle is as long as one.
+/// @param visible_width_m across the box's yaw, of the last sighting
 /// @param speed_mps along the box's yaw
-Growth assumed_growth(const OrientedBox& box, double speed_mps, const Visibility& visibility);
+Growth assumed_growth(const OrientedBox& box, double visible_width_m, double speed_mps, const Visibility& visibility);
+
+/// What of a remembered box lies beyond the part that proved to be the whole object, at each end (negative), where two
+/// objects were taken for one.
+/// @param part at the yaw of `remembered`
+Growth surplus(const OrientedBox& remembered, const OrientedBox& part);
 
 /// Size of a new object: as seen, but with a depth that is at least half of its width up to that of a car: what is seen
 /// from one side only is not flat.

@@ -41,9 +41,9 @@ const DetectionShape& largest_shape(const DetectionShapes& shapes, const Sightin
 
 BoxMeasurement first_measurement(const DetectionShapes& shapes, const Sighting& sighting, const OrientedBox& visible,
                                  const KalmanConfig& config) {
-    BoxMeasurement m =
-        complete_extent(visible, visible.size_m, assumed_box(visible, sighting.visibility), sighting.visibility, config)
-            .box;
+    BoxMeasurement m = complete_extent(visible, visible.size_m, assumed_box(visible, sighting.visibility),
+                                       sighting.visibility, false, config)
+                           .box;
     const DetectionShape& shape = largest_shape(shapes, sighting);
     m.age_s = shape.age_s;
     m.yaw_sd_rad = shape.axis.elongation > kElongated ? 0.2 : 1.0;
@@ -76,7 +76,8 @@ TrackedObject::TrackedObject(std::uint32_t id, const Frame& frame, const Detecti
     : id_(id),
       visible_(visible_box(frame, shapes, sighting, largest_shape(shapes, sighting).axis.yaw_rad)),
       filter_(first_measurement(shapes, sighting, visible_, config.filter), config.filter),
-      first_visible_(visible_) {
+      first_visible_(visible_),
+      born_apart_(sighting.apart) {
     std::vector<OrientedBox> nothing_to_clear;
     see(frame, shapes, sighting, config, nothing_to_clear);
 }
@@ -112,7 +113,8 @@ std::pair<double, double> TrackedObject::measured_yaw(const PointSpan& points) {
 void TrackedObject::assume_extent(const Visibility& visibility) {
     if (belief_.state() != DynamicState::kDynamic || hits_ < kEstablishedHits) return;
     const bool heads_along = filter_.speed() > 4.0 * filter_.velocity_sd();
-    const Growth growth = assumed_growth(filter_.box(), heads_along ? filter_.speed() : 0.0, visibility);
+    const Growth growth =
+        assumed_growth(filter_.box(), visible_.size_m.y(), heads_along ? filter_.speed() : 0.0, visibility);
     filter_.grow(growth.front, growth.back, growth.left, growth.right);
 }
 
@@ -121,20 +123,27 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
     const DetectionShape& shape = largest_shape(shapes, sighting);
     if (hits_ > 0) {
         const auto [yaw, yaw_sd] = measured_yaw(shapes.points(frame.detection.detections[sighting.detections.front()]));
-        const OrientedBox remembered = filter_.box();
+        OrientedBox remembered = filter_.box();
         Eigen::Vector3d before_m = visible_.size_m;
         if (sighting.cut) {
             before_m.y() = 0.0;
             if (remembered.size_m.x() < kVehicle_m) before_m.x() = 0.0;
         }
         visible_ = visible_box(frame, shapes, sighting, remembered.yaw_rad);
-        auto [growth, m] = complete_extent(visible_, before_m, remembered, sighting.visibility, config.filter);
+        if (sighting.apart) {
+            const Growth other = surplus(remembered, assumed_box(visible_, sighting.visibility));
+            filter_.grow(other.front, other.back, other.left, other.right);
+            filter_.doubt_size(kDoubt_m);
+            remembered = filter_.box();
+            before_m = visible_.size_m;
+        }
+        auto [growth, m] = complete_extent(visible_, before_m, remembered, sighting.visibility,
+                                           belief_.state() == DynamicState::kDynamic, config.filter);
         filter_.grow(growth.front, growth.back, growth.left, growth.right);
         m.age_s = shape.age_s;
         m.box.yaw_rad = yaw;
         m.yaw_sd_rad = yaw_sd;
         if (sighting.cut) m.size_sd_m.setConstant(kCutSize_m);
-        if (sighting.apart) filter_.doubt_size(kDoubt_m);
         filter_.update(m, config.filter);
         assume_extent(sighting.visibility);
     }

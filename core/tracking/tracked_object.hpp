@@ -42,8 +42,8 @@ class TrackedObject {
     bool dead(const TrackingConfig& config) const;
     /// Worth telling others of: seen, or dynamic and not known to be gone.
     bool visible_to_others() const;
-    /// Seen often enough to believe in it as an object of its own.
-    bool steady() const { return hits_ >= 3; }
+    /// Seen often enough, or clearly enough, to believe in it as an object of its own.
+    bool steady() const { return hits_ >= 3 || born_apart_; }
 
     ExpectedTrack expected() const;
     Track published() const;
@@ -77,8 +77,9 @@ class TrackedObject {
     MotionBelief belief_;
     BoxHistory history_;
     OrientedBox first_visible_;  ///< as it was seen first, world frame
-    PointSample before_;  ///< points of half a second to a second ago, or of the first sighting
-    PointSample since_;   ///< those that follow them
+    bool born_apart_;            ///< beside an object that it had been taken for a part of
+    PointSample before_;         ///< points of half a second to a second ago, or of the first sighting
+    PointSample since_;          ///< those that follow them
     Eigen::Vector2d before_center_m_ = Eigen::Vector2d::Zero(), since_center_m_ = Eigen::Vector2d::Zero();
     Eigen::Vector2d registered_velocity_mps_ = Eigen::Vector2d::Zero();  ///< by the last registration, 0 if not clear
     int agreeing_ = 0;  ///< frames in a row in which it agreed with the filter's or that of the frame before

@@ -47,12 +47,28 @@ bool stacked(const OrientedBox& a, const OrientedBox& b) {
            (a.center_m - b.center_m).head<2>().norm() < kStackedShift_m;
 }
 
+/// How far two boxes together reach along a box's axes in the ground plane, metres.
+Eigen::Vector2d joint_size(const OrientedBox& a, const OrientedBox& b, double yaw_rad) {
+    const Eigen::Vector2d along(std::cos(yaw_rad), std::sin(yaw_rad));
+    const Eigen::Vector2d across(-along.y(), along.x());
+    const auto half = [](const OrientedBox& box, const Eigen::Vector2d& axis) {
+        const double c = std::cos(box.yaw_rad), s = std::sin(box.yaw_rad);
+        return 0.5 * (std::abs(axis.x() * c + axis.y() * s) * box.size_m.x() +
+                      std::abs(axis.y() * c - axis.x() * s) * box.size_m.y());
+    };
+    const auto reach = [&](const Eigen::Vector2d& axis) {
+        const double at = axis.dot((b.center_m - a.center_m).head<2>());
+        return std::max(half(a, axis), at + half(b, axis)) - std::min(-half(a, axis), at - half(b, axis));
+    };
+    return {reach(along), reach(across)};
+}
+
 /// Of a large object that moves slowly only the front stands where it was free: evidence divides it, but its track
 /// knows its extent.
-bool is_rest_of(const TrackedObject& host, const Detection& rest) {
+bool is_rest_of(const TrackedObject& host, const Detection& front, const Detection& rest) {
     const OrientedBox box = host.box();
     return host.state() == DynamicState::kDynamic && host.hits() >= kYoungHits &&
-           rest.box.size_m.head<2>().maxCoeff() < kRestSize * box.size_m.head<2>().maxCoeff() &&
+           joint_size(front.box, rest.box, box.yaw_rad).maxCoeff() < kRestSize * box.size_m.head<2>().maxCoeff() &&
            rest.box.size_m.z() < kRestSize * box.size_m.z();
 }
 
@@ -170,11 +186,14 @@ void Tracker::State::predict(const Frame& frame) {
 void Tracker::State::associate(Frame& frame) {
     auto& detections = frame.detection.detections;
     shapes.compute(frame);
-    merged.divide(frame, shapes, expected);
-    candidates.clear();
-    for (std::size_t d = 0; d < detections.size(); ++d) candidates.push_back(candidate(detections[d], shapes[d]));
+    const auto associated = [&](std::span<const int> known) -> const std::vector<int>& {
+        candidates.clear();
+        for (std::size_t d = 0; d < detections.size(); ++d) candidates.push_back(candidate(detections[d], shapes[d]));
+        return association.solve(expected, candidates, config.association, known);
+    };
+    const bool divided = merged.divide(frame, shapes, expected, associated({}));
+    const std::vector<int>& detection_of = divided ? associated(merged.known_tracks()) : association.last();
     owner.assign(detections.size(), -1);
-    const std::vector<int>& detection_of = association.solve(expected, candidates, config.association);
     for (std::size_t t = 0; t < detection_of.size(); ++t) {
         if (detection_of[t] >= 0) owner[static_cast<std::size_t>(detection_of[t])] = static_cast<int>(t);
     }
@@ -198,13 +217,18 @@ void Tracker::State::attach_parts(Frame& frame) {
             const TrackedObject& host = objects[t];
             const TrackedObject* guest = own >= 0 ? &objects[static_cast<std::size_t>(own)] : nullptr;
             if (!near_footprint(host.box(), detections[d].centroid_m, kSplinterMargin_m) || !host.steady()) continue;
+            // What is known to move is no part of what is not.
+            if (guest != nullptr && guest->hits() >= kYoungHits && guest->state() == DynamicState::kDynamic &&
+                host.state() != DynamicState::kDynamic)
+                continue;
             const OrientedBox box = host.box();
             // Where a vehicle drives there is nothing else, even if it has been there itself before.
-            const bool rest = (detections[d].segment == detections[other].segment && is_rest_of(host, detections[d])) ||
-                              (host.drives() && share_inside(detections[d].box, box, 0.0) > kInsideVehicle);
-            if (!rest && candidates[d].motion * expected[t].motion < -0.2) continue;
+            const bool rest = detections[d].segment == detections[other].segment &&
+                              is_rest_of(host, detections[other], detections[d]);
+            const bool covered = host.drives() && share_inside(detections[d].box, box, 0.0) > kInsideVehicle;
+            if (!rest && !covered && candidates[d].motion * expected[t].motion < -0.2) continue;
             if (height_gap_m(box, detections[d].box) > kMaxGap_m) continue;
-            double reach = kPartMargin_m;
+            double reach = rest ? kLimbMargin_m : kPartMargin_m;
             if (guest != nullptr) {
                 const bool on_top = host.id() < guest->id() && stacked(detections[other].box, detections[d].box);
                 const bool young = guest->hits() < kYoungHits && host.hits() >= 2 * guest->hits();
@@ -221,7 +245,7 @@ void Tracker::State::attach_parts(Frame& frame) {
             if (distance_m < best * reach && share_inside(detections[d].box, box, reach) > kInside) {
                 best = distance_m / reach;
                 owner[d] = matched[other];
-                limb[d] = distance_m > kPartMargin_m && !host.drives() ? 1 : 0;
+                limb[d] = distance_m > kPartMargin_m && !rest && !host.drives() ? 1 : 0;
             }
         }
         if (own >= 0 && owner[d] != own) absorbed[static_cast<std::size_t>(own)] = 1;

@@ -162,6 +162,19 @@ TEST(Association, ATrackDoesNotTakeWhatIsFarTooLarge) {
 }
 
 // Solving groups of competitors by themselves gives the optimum of the whole.
+TEST(Association, WhatIsKnownIsKept) {
+    Scene scene;
+    scene.track(5.0, 0.0);
+    scene.track(5.0, 0.7);
+    scene.detection(5.0, 0.7);
+    scene.detection(5.0, 0.0);
+    Association association;
+    const std::vector<int> known{0, -1};
+    EXPECT_EQ(association.solve(scene.tracks, scene.detections, {}), (std::vector<int>{1, 0}));
+    EXPECT_EQ(association.solve(scene.tracks, scene.detections, {}, known)[0], 0);
+    EXPECT_NE(association.last()[1], 0);
+}
+
 TEST(Association, GroupsGiveTheOptimumOfTheWhole) {
     std::mt19937 random(8);
     std::uniform_real_distribution<double> place(0.0, 12.0), shift(-0.25, 0.25);

@@ -139,6 +139,37 @@ TEST_F(TrackerTest, PeopleWhoMergeInOneSegmentAreDividedAndKeepTheirIds) {
     }
 }
 
+TEST_F(TrackerTest, PeopleWhoWalkTogetherAndMergeEverySoOftenKeepTheirIds) {
+    Tracker tracker(sensor, config);
+    std::map<int, std::uint32_t> id_of_person;
+    for (int k = 0; k < 90; ++k) {
+        scene.next();
+        const double x = -4.0 + 0.1 * k;
+        const auto a = scene.place(person(x, 4.0));
+        const auto b = scene.place(person(x + 0.1, 4.55));
+        if (k % 7 < 4 && k > 5) {
+            auto both = a;
+            both.insert(both.end(), b.begin(), b.end());
+            scene.detect(both, true);
+        } else {
+            scene.detect(a, true);
+            if (!b.empty()) scene.detect(b, true);
+        }
+        tracker.process(scene.frame);
+        const Track* ta = track_at(x, 4.0);
+        ASSERT_NE(ta, nullptr) << k;
+        if (k == 5) {
+            id_of_person[0] = ta->id;
+            id_of_person[1] = track_at(x + 0.1, 4.55)->id;
+            ASSERT_NE(id_of_person[0], id_of_person[1]);
+        }
+        if (k > 5) {
+            EXPECT_EQ(ta->id, id_of_person[0]) << k;
+            EXPECT_EQ(track_at(x + 0.1, 4.55)->id, id_of_person[1]) << k;
+        }
+    }
+}
+
 TEST_F(TrackerTest, PeopleWhoWereNeverSeenApartAreToldApartByTheGapBetweenThem) {
     Tracker tracker(sensor, config);
     std::set<std::uint32_t> ids;

@@ -1,0 +1,64 @@
+#include "core/tracking/object_extent.hpp"
+
+#include <gtest/gtest.h>
+
+namespace dlod {
+namespace {
+
+OrientedBox box(double x, double y, double z, const Eigen::Vector3d& size_m) {
+    OrientedBox b;
+    b.center_m = {x, y, z};
+    b.size_m = size_m;
+    return b;
+}
+
+const OrientedBox kPerson = box(8.0, 0.0, -0.3, {0.5, 0.6, 1.7});
+
+TEST(ObjectExtent, ALegOfAWalkerSaysLittleOfHisPlaceAndNothingOfHisHeight) {
+    const OrientedBox leg = box(7.85, 0.2, -0.9, {0.15, 0.1, 0.5});
+    const ExtentMeasurement m = complete_extent(leg, leg.size_m, kPerson, {}, true, {});
+    // Inside of the person that was expected: no motion.
+    EXPECT_LT((m.box.box.center_m - kPerson.center_m).norm(), 1e-9);
+    EXPECT_GT(m.box.plane_covariance(0, 0), 0.2 * 0.2);
+    EXPECT_GT(m.box.plane_covariance(1, 1), 0.2 * 0.2);
+    EXPECT_GT(m.box.size_sd_m.z(), 1.0);
+    EXPECT_EQ(m.growth.front + m.growth.back + m.growth.left + m.growth.right, 0.0);
+}
+
+TEST(ObjectExtent, ALegThatIsOutsideMovesTheWalkerNoFartherThanNeeded) {
+    const OrientedBox leg = box(8.0, 0.6, -0.9, {0.2, 0.1, 0.5});
+    const ExtentMeasurement m = complete_extent(leg, leg.size_m, kPerson, {}, true, {});
+    EXPECT_NEAR(m.box.box.center_m.y(), 0.6 + 0.05 - 0.3, 1e-9);
+}
+
+TEST(ObjectExtent, AWalkerWhoIsSeenUprightIsMeasured) {
+    const OrientedBox upright = box(7.9, 0.1, -0.3, {0.3, 0.6, 1.7});
+    const ExtentMeasurement m = complete_extent(upright, upright.size_m, kPerson, {}, true, {});
+    EXPECT_NEAR(m.box.box.center_m.x(), 8.0, 1e-9);  // the near side is seen, the depth remembered
+    EXPECT_NEAR(m.box.box.center_m.y(), 0.1, 1e-9);
+    EXPECT_LT(m.box.plane_covariance(1, 1), 0.1 * 0.1);
+    EXPECT_LT(m.box.size_sd_m.z(), 0.2);
+}
+
+TEST(ObjectExtent, TheHeightOfWhatRestsFollowsWhatIsSeen) {
+    const OrientedBox low = box(8.0, 0.0, -0.9, {0.5, 0.6, 0.5});
+    EXPECT_LT(complete_extent(low, low.size_m, kPerson, {}, false, {}).box.size_sd_m.z(), 0.2);
+}
+
+TEST(ObjectExtent, WhatWasTakenForOneObjectLosesWhatIsTheOthers) {
+    const OrientedBox two = box(5.0, 0.0, 0.0, {0.5, 1.2, 1.7});
+    const Growth g = surplus(two, box(5.0, 0.35, 0.0, {0.5, 0.5, 1.7}));
+    EXPECT_EQ(g.front, 0.0);
+    EXPECT_EQ(g.back, 0.0);
+    EXPECT_NEAR(g.left, 0.0, 1e-9);
+    EXPECT_NEAR(g.right, -0.7, 1e-9);
+}
+
+TEST(ObjectExtent, OnlyWhatIsSeenToBeWideIsAssumedToBeAVehicle) {
+    const OrientedBox wide = box(10.0, 0.0, 0.0, {0.9, 1.7, 1.5});
+    EXPECT_NEAR(assumed_growth(wide, 1.7, 5.0, {}).front, 3.1, 1e-9);
+    EXPECT_EQ(assumed_growth(wide, 0.5, 5.0, {}).front, 0.0);
+}
+
+}  // namespace
+}  // namespace dlod
