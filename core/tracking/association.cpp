@@ -104,37 +104,51 @@ int root_of(std::vector<int>& parent, int i) {
     return i;
 }
 
+/// A detection whose middle is farther from that of the track's whole box is beyond the gate, its own size apart.
+double reach_of(const ExpectedTrack& track, const AssociationConfig& config) {
+    const double size = std::max(track.visible.size_m.head<2>().norm(), track.whole.size_m.head<2>().norm());
+    const double slack = kSlack_m + kSlackOfSize * size;
+    double reach = config.max_speed_mps * track.dt_s + slack;
+    if (!track.young) {
+        const double sd = track.filter->position_sd() + kSweep_s * track.filter->velocity_sd();
+        const double moved = kSweep_s * track.filter->speed();  // before its points are seen
+        reach = std::min(reach, moved + config.gate_sigma * std::hypot(sd, slack));
+    }
+    const double between = (track.visible.center_m - track.whole.center_m).head<2>().norm();
+    return reach + between + 0.5 * size;
+}
+
 }  // namespace
 
 double Association::cost(double iou, int points_a, int points_b, const AssociationConfig& config) {
     return config.alpha * (1.0 - iou) + config.beta * relative_difference(points_a, points_b);
 }
 
-// Most pairs are far apart: they are not to cost more than a glance.
-void Association::set_reaches(std::span<const ExpectedTrack> tracks, std::span<const CandidateDetection> detections,
-                              const AssociationConfig& config) {
-    track_reach_.clear();
-    for (const ExpectedTrack& track : tracks) {
-        const double size = std::max(track.visible.size_m.head<2>().norm(), track.whole.size_m.head<2>().norm());
-        const double slack = kSlack_m + kSlackOfSize * size;
-        double reach = config.max_speed_mps * track.dt_s + slack;
-        if (!track.young) {
-            const double sd = track.filter->position_sd() + kSweep_s * track.filter->velocity_sd();
-            const double moved = kSweep_s * track.filter->speed();  // before its points are seen
-            reach = std::min(reach, moved + config.gate_sigma * std::hypot(sd, slack));
-        }
-        const double between = (track.visible.center_m - track.whole.center_m).head<2>().norm();
-        track_reach_.push_back(reach + between + 0.5 * size);
+void Association::set_places(std::span<const CandidateDetection> detections) {
+    places_.clear();
+    for (const CandidateDetection& detection : detections) {
+        const OrientedBox& box = detection.visible;
+        places_.push_back({box.center_m.x(), box.center_m.y(), 0.5 * box.size_m.head<2>().norm()});
     }
-    detection_reach_.clear();
-    for (const CandidateDetection& detection : detections)
-        detection_reach_.push_back(0.5 * detection.visible.size_m.head<2>().norm());
 }
 
-bool Association::near(std::span<const ExpectedTrack> tracks, std::span<const CandidateDetection> detections,
-                       std::size_t t, std::size_t d) const {
-    const double reach = track_reach_[t] + detection_reach_[d];
-    return (detections[d].visible.center_m - tracks[t].whole.center_m).head<2>().squaredNorm() <= reach * reach;
+// Most pairs are far apart: they are not to cost more than a glance.
+void Association::find_candidates(std::span<const ExpectedTrack> tracks, std::span<const CandidateDetection> detections,
+                                  const AssociationConfig& config) {
+    set_places(detections);
+    candidates_.clear();
+    for (std::size_t t = 0; t < tracks.size(); ++t) {
+        if (detection_of_[t] >= 0) continue;
+        const double x = tracks[t].whole.center_m.x(), y = tracks[t].whole.center_m.y();
+        const double reach = reach_of(tracks[t], config);
+        for (std::size_t d = 0; d < detections.size(); ++d) {
+            const double dx = places_[d].x_m - x, dy = places_[d].y_m - y, most = reach + places_[d].reach_m;
+            if (dx * dx + dy * dy > most * most || track_of_[d] >= 0) continue;
+            const Comparison boxes = compare(tracks[t], detections[d], config);
+            if (boxes.distance > 1.0) continue;
+            candidates_.push_back({static_cast<int>(t), static_cast<int>(d), boxes.distance, boxes.iou});
+        }
+    }
 }
 
 const std::vector<int>& Association::solve(std::span<const ExpectedTrack> tracks,
@@ -145,43 +159,34 @@ const std::vector<int>& Association::solve(std::span<const ExpectedTrack> tracks
     for (std::size_t d = 0; d < known.size(); ++d) {
         if (known[d] >= 0) match(known[d], static_cast<int>(d));
     }
-    set_reaches(tracks, detections, config);
+    find_candidates(tracks, detections, config);
 
     pairs_.clear();
-    for (std::size_t t = 0; t < tracks.size(); ++t) {
-        if (detection_of_[t] >= 0) continue;
-        for (std::size_t d = 0; d < detections.size(); ++d) {
-            if (track_of_[d] >= 0 || !near(tracks, detections, t, d)) continue;
-            const ExpectedTrack& track = tracks[t];
-            const CandidateDetection& detection = detections[d];
-            const Comparison boxes = compare(track, detection, config);
-            if (boxes.distance > 1.0) continue;
-            // A box that fits is the object, whatever its evidence says of this frame.
-            const double c = cost(boxes.iou, track.points, detection.points, config) +
-                             contradiction(track, detection, config) * (1.0 - boxes.iou) + growth(track, detection);
-            if (c < std::min(config.unmatched_cost, config.alpha))
-                pairs_.push_back({static_cast<int>(t), static_cast<int>(d), with_youth(c, track, config)});
-        }
+    for (const Candidate& candidate : candidates_) {
+        const ExpectedTrack& track = tracks[static_cast<std::size_t>(candidate.track)];
+        const CandidateDetection& detection = detections[static_cast<std::size_t>(candidate.detection)];
+        // A box that fits is the object, whatever its evidence says of this frame.
+        const double c = cost(candidate.iou, track.points, detection.points, config) +
+                         contradiction(track, detection, config) * (1.0 - candidate.iou) + growth(track, detection);
+        if (c < std::min(config.unmatched_cost, config.alpha))
+            pairs_.push_back({candidate.track, candidate.detection, with_youth(c, track, config)});
     }
     assign(tracks.size(), detections.size(), config.unmatched_cost);
     if (!config.second_pass) return detection_of_;
 
     pairs_.clear();
-    for (std::size_t t = 0; t < tracks.size(); ++t) {
-        if (detection_of_[t] >= 0) continue;
-        for (std::size_t d = 0; d < detections.size(); ++d) {
-            if (track_of_[d] >= 0 || !near(tracks, detections, t, d)) continue;
-            const ExpectedTrack& track = tracks[t];
-            const CandidateDetection& detection = detections[d];
-            const double distance = compare(track, detection, config).distance;
-            if (distance > 1.0) continue;
-            const double c = 0.5 * distance +
-                             0.3 * relative_difference(track.visible.size_m.z(), detection.visible.size_m.z()) +
-                             0.2 * relative_difference(track.points, detection.points) +
-                             contradiction(track, detection, config) + growth(track, detection);
-            if (c < config.unmatched_cost)
-                pairs_.push_back({static_cast<int>(t), static_cast<int>(d), with_youth(c, track, config)});
-        }
+    for (const Candidate& candidate : candidates_) {
+        if (detection_of_[static_cast<std::size_t>(candidate.track)] >= 0 ||
+            track_of_[static_cast<std::size_t>(candidate.detection)] >= 0)
+            continue;
+        const ExpectedTrack& track = tracks[static_cast<std::size_t>(candidate.track)];
+        const CandidateDetection& detection = detections[static_cast<std::size_t>(candidate.detection)];
+        const double c = 0.5 * candidate.distance +
+                         0.3 * relative_difference(track.visible.size_m.z(), detection.visible.size_m.z()) +
+                         0.2 * relative_difference(track.points, detection.points) +
+                         contradiction(track, detection, config) + growth(track, detection);
+        if (c < config.unmatched_cost)
+            pairs_.push_back({candidate.track, candidate.detection, with_youth(c, track, config)});
     }
     assign(tracks.size(), detections.size(), config.unmatched_cost);
     return detection_of_;

@@ -19,7 +19,7 @@ struct ExpectedTrack {
     bool steady = false;                   ///< seen often enough to believe in it as an object of its own
     bool established = false;              ///< seen so often that younger tracks give way
     double dt_s = 0.0;                     ///< since it was last seen
-    double motion = 0.0;  ///< belief that it moves: -1 (static) .. 1 (moving)
+    double motion = 0.0;                   ///< belief that it moves: -1 (static) .. 1 (moving)
 };
 
 /// A detection as the association sees it.
@@ -52,11 +52,20 @@ class Association {
         int detection = 0;
         double cost = 0.0;
     };
-    void set_reaches(std::span<const ExpectedTrack> tracks, std::span<const CandidateDetection> detections,
-                     const AssociationConfig& config);
-    /// False where a pair is surely beyond the gate.
-    bool near(std::span<const ExpectedTrack> tracks, std::span<const CandidateDetection> detections, std::size_t t,
-              std::size_t d) const;
+    /// A pair within the gate.
+    struct Candidate {
+        int track = 0;
+        int detection = 0;
+        double distance = 0.0;  ///< in units of the gate
+        double iou = 0.0;
+    };
+    struct Place {
+        double x_m, y_m, reach_m;
+    };
+    void set_places(std::span<const CandidateDetection> detections);
+    /// Fills candidates_ with the pairs within the gate of what is not matched yet.
+    void find_candidates(std::span<const ExpectedTrack> tracks, std::span<const CandidateDetection> detections,
+                         const AssociationConfig& config);
     void match(int track, int detection);
     void assign(std::size_t tracks, std::size_t detections, double unmatched_cost);
     void assign_component(std::size_t first, std::size_t last, double unmatched_cost);
@@ -64,7 +73,9 @@ class Association {
     Hungarian hungarian_;
     std::vector<Pair> pairs_;
     std::vector<int> detection_of_, track_of_, component_, row_of_, column_of_, rows_, columns_;
-    std::vector<double> cost_, track_reach_, detection_reach_;
+    std::vector<Candidate> candidates_;
+    std::vector<Place> places_;  ///< of the detections
+    std::vector<double> cost_;
 };
 
 }  // namespace dlod

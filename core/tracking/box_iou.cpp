@@ -89,12 +89,6 @@ double box_iou(const OrientedBox& a, const OrientedBox& b) {
     return either > 0.0 ? both / either : 0.0;
 }
 
-bool near_footprint(const OrientedBox& box, const Eigen::Vector3d& point_m, double distance_m) {
-    // (a + b)^2 <= 2 a^2 + 2 b^2: no root.
-    const double half_diagonal2 = 0.25 * box.size_m.head<2>().squaredNorm();
-    return (point_m - box.center_m).head<2>().squaredNorm() <= 2.0 * (half_diagonal2 + distance_m * distance_m);
-}
-
 double footprint_distance_m(const OrientedBox& box, const Eigen::Vector3d& point_m) {
     const Eigen::Vector3d d = point_m - box.center_m;
     const double c = std::cos(box.yaw_rad), s = std::sin(box.yaw_rad);

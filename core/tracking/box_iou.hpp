@@ -14,9 +14,6 @@ double footprint_iou(const OrientedBox& a, const OrientedBox& b);
 /// Intersection over union of the volumes, 0 to 1: footprints clipped exactly, times the overlap of the heights.
 double box_iou(const OrientedBox& a, const OrientedBox& b);
 
-/// False where the point is surely farther than that from the footprint: a cheap question before the dear one.
-bool near_footprint(const OrientedBox& box, const Eigen::Vector3d& point_m, double distance_m);
-
 /// Distance [m] in the ground plane from a point to a box, 0 inside.
 double footprint_distance_m(const OrientedBox& box, const Eigen::Vector3d& point_m);
 

@@ -1,6 +1,5 @@
 #include "core/tracking/expected_sight.hpp"
 
-#include <algorithm>
 #include <array>
 
 namespace dlod {
@@ -34,10 +33,9 @@ Sight look_at(const OrientedBox& box, const Frame& frame, const SweepProjection&
                         : range > expected + reach ? Sight::kFarther
                                                    : Sight::kThere;
         }
-        ++count[static_cast<std::size_t>(sight)];
+        if (++count[static_cast<std::size_t>(sight)] >= kMostPlaces) return sight;
     }
-    const auto most = std::max_element(count.begin(), count.end());
-    return *most >= kMostPlaces ? static_cast<Sight>(most - count.begin()) : Sight::kUnknown;
+    return Sight::kUnknown;
 }
 
 }  // namespace dlod

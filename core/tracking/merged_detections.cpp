@@ -38,8 +38,7 @@ double area(const OrientedBox& box) {
 }
 
 bool covers(const Detection& detection, const OrientedBox& box) {
-    return near_footprint(detection.box, box.center_m, kInside_m) &&
-           footprint_distance_m(detection.box, box.center_m) < kInside_m &&
+    return footprint_distance_m(detection.box, box.center_m) < kInside_m &&
            std::abs(detection.box.center_m.z() - box.center_m.z()) < 0.5 * (detection.box.size_m.z() + box.size_m.z());
 }
 
@@ -69,7 +68,10 @@ bool MergedDetections::divide(Frame& frame, DetectionShapes& shapes, std::span<c
         const Detection& detection = frame.detection.detections[i];
         covered_.clear();
         double longest = 0.0;
+        const Eigen::Vector2d middle = detection.box.center_m.head<2>();
+        const double reach = 0.5 * detection.box.size_m.head<2>().norm() + kInside_m;
         for (std::size_t t = 0; t < tracks.size(); ++t) {
+            if ((tracks[t].visible.center_m.head<2>() - middle).squaredNorm() > reach * reach) continue;
             if (!tracks[t].steady || !covers(detection, tracks[t].visible) || seen_elsewhere(t, i)) continue;
             const bool twice = std::any_of(covered_.begin(), covered_.end(), [&](std::size_t other) {
                 return same_object(tracks[t].visible, tracks[other].visible);

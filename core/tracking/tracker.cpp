@@ -37,6 +37,11 @@ double shared_footprint(const OrientedBox& a, const OrientedBox& b) {
     return smaller > 0.0 ? footprint_intersection_m2(a, b) / smaller : 0.0;
 }
 
+/// From the middle of a footprint to its corners.
+double reach_m(const OrientedBox& box) {
+    return 0.5 * box.size_m.head<2>().norm();
+}
+
 double height_gap_m(const OrientedBox& a, const OrientedBox& b) {
     return std::abs(a.center_m.z() - b.center_m.z()) - 0.5 * (a.size_m.z() + b.size_m.z());
 }
@@ -132,6 +137,13 @@ struct Tracker::State {
     void publish(Frame& frame);
     Sighting sighting_of(const Frame& frame, std::size_t owner);
 
+    /// A detection to whose object others may belong.
+    struct Host {
+        double x_m, y_m, reach_m;  ///< expected middle, and how far from it a part's may be
+        std::size_t detection;
+        int track;
+    };
+
     TrackingConfig config;
     std::vector<TrackedObject> objects;  ///< by ascending id
     std::uint32_t next_id;
@@ -147,7 +159,12 @@ struct Tracker::State {
     std::vector<int> owner;      ///< of each detection: index into objects, -1 none
     std::vector<char> absorbed;  ///< of each object: its detection belongs to another one
     std::vector<char> limb;      ///< of each detection: 1 beside its object's box: belongs to it, but does not shape it
-    std::vector<std::size_t> parts;  ///< detections of the object at hand
+    std::vector<std::size_t> parts;   ///< detections of the object at hand
+    std::vector<std::size_t> strays;  ///< detections without an object
+    std::vector<Host> hosts;
+    std::vector<OrientedBox> boxes;  ///< of the objects
+    std::vector<double> reaches_m;   ///< and their half diagonals
+    std::vector<int> row;            ///< of the objects among the published tracks
 };
 
 Tracker::Tracker(const SensorModel& sensor, const TrackingConfig& config, std::uint32_t first_id)
@@ -204,24 +221,31 @@ void Tracker::State::associate(Frame& frame) {
 // tracks that stand on top of one another and the smaller of two that are pieces of one vehicle.
 void Tracker::State::attach_parts(Frame& frame) {
     const auto& detections = frame.detection.detections;
-    const std::vector<int> matched = owner;
     limb.assign(detections.size(), 0);
     absorbed.assign(objects.size(), 0);
+    hosts.clear();
     for (std::size_t d = 0; d < detections.size(); ++d) {
-        const int own = matched[d];
+        if (owner[d] < 0 || !objects[static_cast<std::size_t>(owner[d])].steady()) continue;
+        const OrientedBox& box = expected[static_cast<std::size_t>(owner[d])].whole;
+        hosts.push_back({box.center_m.x(), box.center_m.y(), reach_m(box) + kSplinterMargin_m, d, owner[d]});
+    }
+    for (std::size_t d = 0; d < detections.size(); ++d) {
+        const int own = owner[d];
         if (merged.is_apart(d)) continue;
+        const double x = detections[d].centroid_m.x(), y = detections[d].centroid_m.y();
         double best = 1.0;
-        for (std::size_t other = 0; other < detections.size(); ++other) {
-            if (matched[other] < 0 || matched[other] == own) continue;
-            const auto t = static_cast<std::size_t>(matched[other]);
+        for (const Host& h : hosts) {
+            const double dx = h.x_m - x, dy = h.y_m - y;
+            if (dx * dx + dy * dy > h.reach_m * h.reach_m || h.track == own) continue;
+            const std::size_t other = h.detection;
+            const auto t = static_cast<std::size_t>(h.track);
             const TrackedObject& host = objects[t];
             const TrackedObject* guest = own >= 0 ? &objects[static_cast<std::size_t>(own)] : nullptr;
-            if (!near_footprint(host.box(), detections[d].centroid_m, kSplinterMargin_m) || !host.steady()) continue;
             // What is known to move is no part of what is not.
             if (guest != nullptr && guest->hits() >= kYoungHits && guest->state() == DynamicState::kDynamic &&
                 host.state() != DynamicState::kDynamic)
                 continue;
-            const OrientedBox box = host.box();
+            const OrientedBox& box = expected[t].whole;
             // Where a vehicle drives there is nothing else, even if it has been there itself before.
             const bool rest = detections[d].segment == detections[other].segment &&
                               is_rest_of(host, detections[other], detections[d]);
@@ -244,7 +268,7 @@ void Tracker::State::attach_parts(Frame& frame) {
             const double distance_m = footprint_distance_m(box, detections[d].centroid_m);
             if (distance_m < best * reach && share_inside(detections[d].box, box, reach) > kInside) {
                 best = distance_m / reach;
-                owner[d] = matched[other];
+                owner[d] = h.track;
                 limb[d] = distance_m > kPartMargin_m && !rest && !host.drives() ? 1 : 0;
             }
         }
@@ -300,18 +324,28 @@ void Tracker::State::see_and_miss(Frame& frame) {
         if (!object.seen()) object.miss(look_at(object.box(), frame, projection));
     }
     // Two tracks on one object: the one that was not seen goes.
-    const auto duplicate = [&](const TrackedObject& object) {
-        if (object.seen()) return false;
-        if (absorbed[static_cast<std::size_t>(&object - objects.data())] != 0) return true;
-        return std::any_of(objects.begin(), objects.end(), [&](const TrackedObject& other) {
-            return other.seen() && may_replace(other, object) &&
-                   shared_footprint(object.box(), other.box()) > kDuplicate;
-        });
+    boxes.clear();
+    reaches_m.clear();
+    for (const TrackedObject& object : objects) {
+        boxes.push_back(object.box());
+        reaches_m.push_back(reach_m(boxes.back()));
+    }
+    const auto duplicate = [&](std::size_t t) {
+        if (objects[t].seen()) return false;
+        if (absorbed[t] != 0) return true;
+        for (std::size_t other = 0; other < objects.size(); ++other) {
+            if (!objects[other].seen()) continue;
+            const double most = reaches_m[t] + reaches_m[other];
+            if ((boxes[t].center_m - boxes[other].center_m).head<2>().squaredNorm() > most * most) continue;
+            if (may_replace(objects[other], objects[t]) && shared_footprint(boxes[t], boxes[other]) > kDuplicate)
+                return true;
+        }
+        return false;
     };
     std::vector<std::size_t>& gone = parts;
     gone.clear();
     for (std::size_t t = 0; t < objects.size(); ++t) {
-        if (objects[t].dead(config) || duplicate(objects[t])) gone.push_back(t);
+        if (objects[t].dead(config) || duplicate(t)) gone.push_back(t);
     }
     if (gone.empty()) return;
     for (int& t : owner) {
@@ -326,22 +360,23 @@ void Tracker::State::see_and_miss(Frame& frame) {
 // The largest detections first; what stands above or below one of them is the same object.
 void Tracker::State::give_birth(Frame& frame) {
     const auto& detections = frame.detection.detections;
-    std::vector<std::size_t> left;
+    strays.clear();
     for (std::size_t d = 0; d < detections.size(); ++d) {
-        if (owner[d] < 0) left.push_back(d);
+        if (owner[d] < 0) strays.push_back(d);
     }
-    std::stable_sort(left.begin(), left.end(),
-                     [&](std::size_t a, std::size_t b) { return detections[a].count > detections[b].count; });
-    for (std::size_t i = 0; i < left.size() && objects.size() < static_cast<std::size_t>(config.max_tracks); ++i) {
-        const std::size_t d = left[i];
+    std::sort(strays.begin(), strays.end(), [&](std::size_t a, std::size_t b) {
+        return detections[a].count != detections[b].count ? detections[a].count > detections[b].count : a < b;
+    });
+    for (std::size_t i = 0; i < strays.size() && objects.size() < static_cast<std::size_t>(config.max_tracks); ++i) {
+        const std::size_t d = strays[i];
         if (owner[d] >= 0) continue;
         const auto t = static_cast<int>(objects.size());
         owner[d] = t;
-        for (std::size_t j = i + 1; j < left.size(); ++j) {
-            const OrientedBox& part = detections[left[j]].box;
-            if (owner[left[j]] < 0 && shared_footprint(detections[d].box, part) > kSameFootprint &&
+        for (std::size_t j = i + 1; j < strays.size(); ++j) {
+            const OrientedBox& part = detections[strays[j]].box;
+            if (owner[strays[j]] < 0 && shared_footprint(detections[d].box, part) > kSameFootprint &&
                 height_gap_m(detections[d].box, part) < kMaxGap_m) {
-                owner[left[j]] = t;
+                owner[strays[j]] = t;
             }
         }
         objects.emplace_back(next_id++, frame, shapes, sighting_of(frame, static_cast<std::size_t>(t)), config);
@@ -349,7 +384,7 @@ void Tracker::State::give_birth(Frame& frame) {
 }
 
 void Tracker::State::publish(Frame& frame) {
-    std::vector<int> row(objects.size(), -1);
+    row.assign(objects.size(), -1);
     for (std::size_t t = 0; t < objects.size(); ++t) {
         if (!objects[t].visible_to_others()) continue;
         row[t] = static_cast<int>(frame.detection.tracks.size());
