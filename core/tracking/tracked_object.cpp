@@ -15,7 +15,7 @@ namespace {
 constexpr int kYoungHits = 3;              // detections before a velocity means something
 constexpr int kEstablishedHits = 5;        // detections before its prediction is worth something
 constexpr int kBlindFrames = 2;            // a prediction is published where nothing is seen
-constexpr double kVague_m = 0.5;           // and none whose standard deviation is larger
+constexpr double kVague_m = 0.3;           // and none that is less sure: half of a person
 constexpr double kHeadingSpeed_mps = 0.7;  // slower objects may move sideways
 constexpr double kElongated = 1.6;         // a principal axis says where an object points
 constexpr double kDoubt_m = 0.5;           // in the size of what may have been two
