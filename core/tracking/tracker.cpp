@@ -20,6 +20,7 @@ constexpr double kSplinterMargin_m = 0.8;  // and of a splinter at the corners o
 constexpr unsigned kSplinter = 10;         // that is so much smaller
 constexpr unsigned kLimb = 3;              // small: a third of the object's pixels
 constexpr double kLowLimb = 0.5;           // of the object's height
+constexpr double kLeastBody = 0.6;         // of the height of the object beside it
 constexpr double kInside = 0.6;            // of its footprint lies inside of those margins
 constexpr double kInsideVehicle = 0.8;     // or of a moving vehicle's box itself
 constexpr double kSimilar = 1.5;           // ratio of footprint diagonals
@@ -97,6 +98,11 @@ bool is_limb_of(const TrackedObject& host, const TrackedObject& guest) {
     return host.state() == DynamicState::kDynamic && host.hits() >= kYoungHits &&
            guest.box().size_m.z() < kLowLimb * host.box().size_m.z() &&
            share_inside(guest.box(), host.box(), kPartMargin_m) > kInside;
+}
+
+/// As tall as the other, and seen for long: an object of its own, whatever an occluder has left of either.
+bool is_body_beside(const TrackedObject& host, const TrackedObject& guest) {
+    return guest.hits() >= kYoungHits && guest.box().size_m.z() > kLeastBody * host.box().size_m.z();
 }
 
 /// Whether a track that is seen may be the object of one that is not: what moves is not taken for something that rests,
@@ -254,7 +260,8 @@ void Tracker::State::attach_parts(Frame& frame) {
             if (height_gap_m(box, detections[d].box) > kMaxGap_m) continue;
             double reach = rest ? kLimbMargin_m : kPartMargin_m;
             if (guest != nullptr) {
-                const bool on_top = host.id() < guest->id() && stacked(detections[other].box, detections[d].box);
+                const bool on_top = host.id() < guest->id() && stacked(detections[other].box, detections[d].box) &&
+                                    !is_body_beside(host, *guest);
                 const bool young = guest->hits() < kYoungHits && host.hits() >= 2 * guest->hits();
                 const bool piece = kLimb * detections[d].count < detections[other].count && is_limb_of(host, *guest);
                 if (!on_top && !young && !piece && !one_vehicle(host, *guest)) continue;
