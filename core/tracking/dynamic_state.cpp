@@ -20,6 +20,7 @@ constexpr double kMaxLogOdds = 8.0;   // bounds keep a belief reversible
 constexpr double kMaxStep = 2.4;      // one frame alone never decides
 constexpr double kAway_m = 0.15;      // from the mean place of rest
 constexpr double kRestMean = 0.1;     // weight of a new position in that mean
+constexpr double kResting = 0.5;      // of the time of rest
 constexpr int kAwayDetections = 2;    // in a row off the place of rest: it has set off
 
 }  // namespace
@@ -108,9 +109,10 @@ DynamicState MotionBelief::fused(const MotionCues& cues, const DynamicStateConfi
     log_odds_ = std::clamp(log_odds_ + step, config.static_log_odds - 0.5, kMaxLogOdds);
     rest(cues, config);
     if (state_ == DynamicState::kDynamic) {
-        rested_ = rest_s_ >= config.rest_time_s;
-        off_anchor_ = 0;
+        // Where it has come to rest, the past says the same as where it has never moved.
         const bool mistaken = log_odds_ <= config.static_log_odds;
+        rested_ = rest_s_ >= (mistaken ? kResting : 1.0) * config.rest_time_s;
+        off_anchor_ = 0;
         if (!rested_ && !mistaken) return state_;
         log_odds_ = std::min(log_odds_, 0.0);
         return DynamicState::kStatic;

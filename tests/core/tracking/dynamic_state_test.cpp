@@ -143,5 +143,26 @@ TEST(DynamicState, AMistakeIsTakenBack) {
     EXPECT_LT(frames, 15);
 }
 
+// A bus that halts stands where it was seen a moment ago; when it sets off its side slides along itself.
+TEST(DynamicState, WhatCameToRestSetsOffByItsWayAloneEvenIfThePastSpokeAgainstItSoon) {
+    const DynamicStateConfig config;
+    MotionBelief belief;
+    double x_m = 0.0;
+    const auto see = [&](const MotionCues& evidence, double step_m) {
+        MotionCues cues = evidence;
+        x_m += step_m;
+        cues.position_m.x() = x_m;
+        cues.dt_s = 0.1;
+        belief.update(cues, config);
+    };
+    for (int n = 0; n < 30; ++n) see(free_cue(60, 10), 0.3);
+    ASSERT_EQ(belief.state(), DynamicState::kDynamic);
+    for (int n = 0; n < 15; ++n) see(free_cue(20, 60), 0.0);
+    for (int n = 0; n < 10; ++n) see(free_cue(0, 100), 0.0);
+    ASSERT_EQ(belief.state(), DynamicState::kStatic);
+    for (int n = 0; n < 3; ++n) see(free_cue(0, 100), 0.2);
+    EXPECT_EQ(belief.state(), DynamicState::kDynamic);
+}
+
 }  // namespace
 }  // namespace dlod
