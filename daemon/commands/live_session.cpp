@@ -66,7 +66,11 @@ LiveSession::LiveSession(const Config& config, const driver::SensorInfo& sensor,
       pipeline_(sensor, config.method, config.frames, recording_, sinks(), pipeline_options(config)) {}
 
 FrameSinks LiveSession::sinks() {
-    return {.publish = [this](PipelineFrame& frame) { publish(frame); },
+    return {.publish_pose = [this](PipelineFrame& frame) { publish_pose(frame); },
+            .publish =
+                [this](PipelineFrame& frame) {
+                    if (messages_) messages_->publish(frame, frame.utime_us);
+                },
             .write = [this](PipelineFrame& frame) { write(frame); },
             .finished = [this](const PipelineFrame& frame) { board_.add(frame, monotonic_ns()); }};
 }
@@ -82,19 +86,21 @@ void LiveSession::start() {
     spdlog::info("receiving on port {}, {}", fmt::join(socket_.ports(), " and "), description_);
 }
 
-void LiveSession::publish(const PipelineFrame& frame) {
+void LiveSession::publish_pose(PipelineFrame& frame) {
     if (!messages_) return;
     host_time_.add(frame.header.stamp_ns, frame.header.receive_ns);
     report_clock_step();
     const bool sensor_time = utime_source_.load(std::memory_order_relaxed) == 1;
     const std::int64_t stamp_ns = sensor_time ? frame.header.stamp_ns : host_time_.next_stamp_ns(frame.header.stamp_ns);
-    messages_->publish(frame, stamp_ns / 1000);
+    frame.utime_us = stamp_ns / 1000;
+    messages_->publish_pose(frame, frame.utime_us);
 }
 
 void LiveSession::report_clock_step() {
     const auto step = host_time_.take_step();
     if (!step.happened) return;
-    warnings_.warn("clock step",
+    // Either way is news of its own.
+    warnings_.warn(step.by_ns > 0 ? "clock step forward" : "clock step back",
                    fmt::format("the clocks of host and sensor moved by {:.3f} s against each other; utime {}",
                                1e-9 * static_cast<double>(step.by_ns),
                                step.followed ? "follows" : "stays on the old scale, as it never goes back"));

@@ -56,7 +56,7 @@ class LiveSession {
 
   private:
     FrameSinks sinks();
-    void publish(const PipelineFrame& frame);
+    void publish_pose(PipelineFrame& frame);
     void write(PipelineFrame& frame);
     void save_last_map();
     CounterList counters();

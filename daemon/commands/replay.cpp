@@ -125,7 +125,10 @@ ExitCode replay(const ReplayArguments& arguments) {
 
     Summary summary;
     FrameSinks sinks;
-    if (messages) sinks.publish = [&](PipelineFrame& frame) { messages->publish(frame); };
+    if (messages) {
+        sinks.publish_pose = [&](PipelineFrame& frame) { messages->publish_pose(frame); };
+        sinks.publish = [&](PipelineFrame& frame) { messages->publish(frame); };
+    }
     if (writer) sinks.write = [&](PipelineFrame& frame) { writer->write(frame); };
     sinks.finished = [&](const PipelineFrame& frame) {
         summary.add(frame);

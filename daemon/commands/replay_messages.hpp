@@ -19,7 +19,8 @@ class ReplayMessages {
     /// Opens LCM. @throws MessageBusError
     ReplayMessages(const Config& config, const driver::SensorInfo& sensor);
 
-    /// The messages of a frame; utime is the packets' own time.
+    /// The messages of a frame, its pose and the rest; utime is the packets' own time.
+    void publish_pose(const PipelineFrame& frame) { messages_.publish_pose(frame, frame.header.stamp_ns / 1000); }
     void publish(const PipelineFrame& frame) { messages_.publish(frame, frame.header.stamp_ns / 1000); }
     /// A frame is through.
     void add(const PipelineFrame& frame);

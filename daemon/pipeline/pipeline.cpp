@@ -147,8 +147,15 @@ void Pipeline::prepare(PipelineFrame& frame) {
 }
 
 void Pipeline::estimate_pose(PipelineFrame& frame) {
-    const StepTimer timer(frame.times, Step::kOdometry);
-    method_.estimate_pose(frame, feedback_[odometry_.completed() % kFeedbackDelay]);
+    {
+        const StepTimer timer(frame.times, Step::kOdometry);
+        method_.estimate_pose(frame, feedback_[odometry_.completed() % kFeedbackDelay]);
+    }
+    {
+        const StepTimer timer(frame.times, Step::kPublish);
+        if (sinks_.publish_pose) sinks_.publish_pose(frame);
+    }
+    frame.pose_latency_ms = latency_ms(frame);
 }
 
 void Pipeline::detect_and_track(PipelineFrame& frame) {
@@ -167,10 +174,13 @@ void Pipeline::publish(PipelineFrame& frame) {
         const StepTimer timer(frame.times, Step::kPublish);
         if (sinks_.publish) sinks_.publish(frame);
     }
-    const std::int64_t latency_ns = options_.live ? StepTimer::now_ns(CLOCK_REALTIME) - frame.header.receive_ns
-                                                  : StepTimer::now_ns(CLOCK_MONOTONIC) - frame.emitted_ns;
+    frame.latency_ms = latency_ms(frame);
     admission_.published(frame.admission, StepTimer::now_ns(CLOCK_MONOTONIC));
-    frame.latency_ms = static_cast<float>(1e-6 * static_cast<double>(latency_ns));
+}
+
+/// Since its last packet was received.
+float Pipeline::latency_ms(const PipelineFrame& frame) {
+    return static_cast<float>(1e-6 * static_cast<double>(StepTimer::now_ns(CLOCK_MONOTONIC) - frame.received_ns));
 }
 
 void Pipeline::update_map(PipelineFrame& frame) {

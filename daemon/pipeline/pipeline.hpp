@@ -1,6 +1,6 @@
 // From packets to published, mapped and written results: the stages on a pool of threads.
 //
-//   ingest -> prepare -> odometry -> detect and track -> publish -> map -> write
+//   ingest -> prepare -> odometry, publish pose -> detect and track -> publish -> map -> write
 //
 // Each stage works on one frame at a time and sees the frames in order; different stages work on different frames side
 // by side. The feedback of the n-th frame reaches the odometry of frame n + kFeedbackDelay: the odometry waits for it,
@@ -25,7 +25,8 @@ namespace dlod::daemon {
 /// What becomes of a frame's results. Each is called on some worker, for one frame at a time, in order; what it throws
 /// ends the pipeline (Pipeline::rethrow_failure). An empty one is skipped.
 struct FrameSinks {
-    std::function<void(PipelineFrame&)> publish;
+    std::function<void(PipelineFrame&)> publish_pose;  ///< as soon as the pose is known
+    std::function<void(PipelineFrame&)> publish;       ///< when all else is
     std::function<void(PipelineFrame&)> write;
     std::function<void(const PipelineFrame&)> finished;  ///< after all others, with all times known
 };
@@ -80,6 +81,7 @@ class Pipeline {
     void publish(PipelineFrame& frame);
     void update_map(PipelineFrame& frame);
     void write(PipelineFrame& frame);
+    static float latency_ms(const PipelineFrame& frame);
     void signal_if_done();
     bool receives_on_own_thread() const { return options_.live || options_.paced; }
     std::vector<Actor*> actors();

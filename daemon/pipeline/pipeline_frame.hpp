@@ -16,7 +16,9 @@ struct PipelineFrame : Frame {
     std::int64_t emitted_ns = 0;   ///< CLOCK_MONOTONIC when the frame builder gave it out
     std::int64_t received_ns = 0;  ///< CLOCK_MONOTONIC when the kernel received its last packet; replay: as emitted_ns
     Admission::Mark admission;
-    float latency_ms = 0.0F;  ///< from its last packet's receipt to the end of publishing
+    std::int64_t utime_us = 0;     ///< of its messages
+    float pose_latency_ms = 0.0F;  ///< from its last packet's receipt to the publication of its pose
+    float latency_ms = 0.0F;       ///< and to the end of publishing
 };
 
 }  // namespace dlod::daemon

@@ -41,14 +41,6 @@ std::size_t obstacles_that_fit(std::size_t room) {
     return (room - encoded_size(none)) / (encoded_size(one) - encoded_size(none));
 }
 
-std::int32_t flags_of(const OdometryResult& odometry) {
-    static_assert(pose_t::IMU_USED == 2 * OdometryResult::kImuUsed &&
-                  pose_t::IMU_FAULTY == 2 * OdometryResult::kImuFaulty &&
-                  pose_t::RESTARTED == 2 * OdometryResult::kStarted);
-    // The message's flags are the odometry's, moved up by one bit for VALID.
-    return static_cast<std::int32_t>(odometry.flags << 1U) | (odometry.valid ? pose_t::VALID : 0);
-}
-
 void fill(const Track& track, track_t& message) {
     message.id = track.id;
     message.state = static_cast<std::int8_t>(track.state);
@@ -67,29 +59,13 @@ void fill(const Track& track, track_t& message) {
 
 }  // namespace
 
-BaseMotion base_motion(const OdometryResult& odometry, const Eigen::Isometry3d& T_base_sensor) {
-    BaseMotion motion;
-    motion.T_odom_base = odometry.T_world_sensor * T_base_sensor.inverse();
-    const Eigen::Vector3d lever = T_base_sensor.translation();
-    motion.angular_velocity_radps = T_base_sensor.linear() * odometry.angular_velocity_radps;
-    motion.linear_velocity_mps =
-        T_base_sensor.linear() * odometry.linear_velocity_mps - motion.angular_velocity_radps.cross(lever);
-    // p_base = p_sensor - d with d = R_odom_base * lever: a small rotation r moves it by d x r.
-    Matrix6d J = Matrix6d::Identity();
-    J.topRightCorner<3, 3>() = skew(motion.T_odom_base.linear() * lever);
-    motion.covariance = J * odometry.covariance * J.transpose();
-    return motion;
-}
-
 FramePublisher::FramePublisher(MessageBus& bus, const SensorModel& sensor, const Eigen::Isometry3d& T_base_sensor,
                                const LcmConfig& config)
     : sender_(bus),
-      T_base_sensor_(T_base_sensor),
-      pose_channel_(config.channel_prefix + "POSE"),
+      T_sensor_base_(T_base_sensor.inverse()),
       mask_channel_(config.channel_prefix + "MASK"),
       tracks_channel_(config.channel_prefix + "TRACKS"),
       obstacles_channel_(config.channel_prefix + "OBSTACLES"),
-      bot_core_channel_(config.bot_core_channel),
       rows_per_part_(rows_that_fit(sensor, room_for(mask_channel_))),
       max_tracks_(tracks_that_fit(room_for(tracks_channel_))),
       obstacles_every_(static_cast<std::uint64_t>(config.obstacles.every_frames)) {
@@ -102,36 +78,9 @@ FramePublisher::FramePublisher(MessageBus& bus, const SensorModel& sensor, const
 }
 
 void FramePublisher::publish(const Frame& frame, std::int64_t utime) {
-    const BaseMotion motion = base_motion(frame.odometry, T_base_sensor_);
-    publish_pose(frame, motion, utime);
     publish_mask(frame, utime);
     publish_tracks(frame, utime);
-    if (!frame.odometry.valid) return;
-    if (!bot_core_channel_.empty()) publish_bot_core_pose(motion, utime);
-    if (obstacles_) publish_obstacles(frame, motion, utime);
-}
-
-void FramePublisher::publish_pose(const Frame& frame, const BaseMotion& motion, std::int64_t utime) {
-    const Eigen::Quaterniond q(motion.T_odom_base.linear());
-    pose_.utime = utime;
-    pose_.sequence = static_cast<std::int64_t>(frame.header.sequence);
-    Eigen::Vector3d::Map(pose_.position) = motion.T_odom_base.translation();
-    Eigen::Vector4d::Map(pose_.orientation) = Eigen::Vector4d(q.w(), q.x(), q.y(), q.z());
-    Eigen::Vector3d::Map(pose_.linear_velocity) = motion.linear_velocity_mps;
-    Eigen::Vector3d::Map(pose_.angular_velocity) = motion.angular_velocity_radps;
-    Matrix6d::Map(pose_.covariance) = motion.covariance;
-    pose_.flags = flags_of(frame.odometry);
-    sender_.send(pose_channel_, pose_);
-}
-
-void FramePublisher::publish_bot_core_pose(const BaseMotion& motion, std::int64_t utime) {
-    const Eigen::Quaterniond q(motion.T_odom_base.linear());
-    bot_core_pose_.utime = utime;
-    Eigen::Vector3d::Map(bot_core_pose_.pos) = motion.T_odom_base.translation();
-    Eigen::Vector3d::Map(bot_core_pose_.vel) = motion.T_odom_base.linear() * motion.linear_velocity_mps;
-    Eigen::Vector4d::Map(bot_core_pose_.orientation) = Eigen::Vector4d(q.w(), q.x(), q.y(), q.z());
-    Eigen::Vector3d::Map(bot_core_pose_.rotation_rate) = motion.angular_velocity_radps;
-    sender_.send(bot_core_channel_, bot_core_pose_);
+    if (frame.odometry.valid && obstacles_) publish_obstacles(frame, utime);
 }
 
 void FramePublisher::publish_mask(const Frame& frame, std::int64_t utime) {
@@ -175,11 +124,11 @@ void FramePublisher::publish_tracks(const Frame& frame, std::int64_t utime) {
     sender_.send(tracks_channel_, tracks_);
 }
 
-void FramePublisher::publish_obstacles(const Frame& frame, const BaseMotion& motion, std::int64_t utime) {
+void FramePublisher::publish_obstacles(const Frame& frame, std::int64_t utime) {
     const std::uint64_t sequence = frame.header.sequence;
     if (obstacles_sequence_ && sequence - *obstacles_sequence_ < obstacles_every_) return;
     obstacles_sequence_ = sequence;
-    obstacles_->extract(frame, motion.T_odom_base.translation(), obstacles_message_);
+    obstacles_->extract(frame, frame.odometry.T_world_sensor * T_sensor_base_.translation(), obstacles_message_);
     obstacles_message_.utime = utime;
     sender_.send(obstacles_channel_, obstacles_message_);
 }

@@ -1,12 +1,10 @@
-// A frame's results as LCM messages: pose, dynamic mask, tracks, and where configured obstacles and bot_core's pose.
+// What is moving in a frame as LCM messages: dynamic mask, tracks, and where configured obstacles.
 #pragma once
 
 #include <Eigen/Geometry>
-#include <bot_core/pose_t.hpp>
 #include <cstdint>
 #include <dlod/dynamic_mask_t.hpp>
 #include <dlod/obstacles_t.hpp>
-#include <dlod/pose_t.hpp>
 #include <dlod/tracks_t.hpp>
 #include <optional>
 #include <string>
@@ -18,15 +16,6 @@
 #include "daemon/publish/obstacles.hpp"
 
 namespace dlod::daemon {
-
-/// T_odom_base and the base's motion of an odometry result; odom is the odometry's world frame.
-struct BaseMotion {
-    Eigen::Isometry3d T_odom_base = Eigen::Isometry3d::Identity();
-    Eigen::Vector3d linear_velocity_mps = Eigen::Vector3d::Zero();     ///< base frame
-    Eigen::Vector3d angular_velocity_radps = Eigen::Vector3d::Zero();  ///< base frame
-    Matrix6d covariance = Matrix6d::Zero();                            ///< of position, then rotation, in odom
-};
-BaseMotion base_motion(const OdometryResult& odometry, const Eigen::Isometry3d& T_base_sensor);
 
 /// Encodes into buffers made once and publishes; every message fits in one datagram, whatever the scene. For one
 /// thread.
@@ -43,25 +32,19 @@ class FramePublisher {
     std::uint64_t failed() const { return sender_.failed(); }
 
   private:
-    void publish_pose(const Frame& frame, const BaseMotion& motion, std::int64_t utime);
-    void publish_bot_core_pose(const BaseMotion& motion, std::int64_t utime);
     void publish_mask(const Frame& frame, std::int64_t utime);
     void publish_tracks(const Frame& frame, std::int64_t utime);
-    void publish_obstacles(const Frame& frame, const BaseMotion& motion, std::int64_t utime);
+    void publish_obstacles(const Frame& frame, std::int64_t utime);
 
     MessageSender sender_;
-    Eigen::Isometry3d T_base_sensor_;
-    std::string pose_channel_;
+    Eigen::Isometry3d T_sensor_base_;
     std::string mask_channel_;
     std::string tracks_channel_;
     std::string obstacles_channel_;
-    std::string bot_core_channel_;
     int rows_per_part_;
     std::size_t max_tracks_;
-    pose_t pose_{};
     dynamic_mask_t mask_{};
     tracks_t tracks_{};
-    bot_core::pose_t bot_core_pose_{};
     obstacles_t obstacles_message_{};
     std::vector<std::pair<double, const Track*>> by_distance_;
     std::optional<Obstacles> obstacles_;  ///< where configured

@@ -6,6 +6,7 @@
 
 #include "daemon/publish/frame_publisher.hpp"
 #include "daemon/publish/lcm_bus.hpp"
+#include "daemon/publish/pose_publisher.hpp"
 #include "daemon/publish/sensor_announcer.hpp"
 
 namespace dlod::daemon {
@@ -15,6 +16,7 @@ class SessionMessages {
     /// Opens LCM. @throws MessageBusError
     SessionMessages(const LcmConfig& config, const driver::SensorInfo& sensor, const Eigen::Isometry3d& T_base_sensor)
         : bus_(config.url),
+          poses_(bus_, T_base_sensor, config),
           frames_(bus_, sensor.model, T_base_sensor, config),
           sensor_(bus_, sensor, T_base_sensor, config.channel_prefix),
           status_(bus_),
@@ -22,20 +24,23 @@ class SessionMessages {
 
     MessageBus& bus() { return bus_; }
 
-    /// The results of a frame. @param utime [us]. On one thread.
+    /// A frame's pose. @param utime [us]. On one thread.
+    void publish_pose(const Frame& frame, std::int64_t utime) { poses_.publish(frame, utime); }
+    /// The rest of its results. @param utime [us]. On one thread, which may be another one.
     void publish(const Frame& frame, std::int64_t utime) { frames_.publish(frame, utime); }
 
-    // The rest on one thread, which may be another one.
+    // The following on one thread, which may be a third one.
 
     /// The sensor's description, where it is due. @param now_ns CLOCK_MONOTONIC @param utime [us] host time
     void announce_sensor(std::int64_t now_ns, std::int64_t utime) { sensor_.announce_if_due(now_ns, utime); }
     void send(const status_t& status) { status_.send(status_channel_, status); }
 
     /// Messages that could not be sent; from any thread.
-    std::uint64_t failed() const { return frames_.failed() + sensor_.failed() + status_.failed(); }
+    std::uint64_t failed() const { return poses_.failed() + frames_.failed() + sensor_.failed() + status_.failed(); }
 
   private:
     LcmBus bus_;
+    PosePublisher poses_;
     FramePublisher frames_;
     SensorAnnouncer sensor_;
     MessageSender status_;

@@ -69,15 +69,17 @@ StatusBoard::StatusBoard(std::string version, std::string sensor, std::int64_t s
     status_.version = std::move(version);
     status_.sensor = std::move(sensor);
     status_.pose_age = -1;
-    status_.stages = static_cast<std::int32_t>(kStepCount + 1);
+    status_.stages = static_cast<std::int32_t>(kStepCount + 2);
     status_.stage_name.assign(kStepNames.begin(), kStepNames.end());
+    status_.stage_name.emplace_back("pose_latency");
     status_.stage_name.emplace_back("latency");
-    for (auto* series : {&status_.stage_p50, &status_.stage_p99, &status_.stage_max}) series->resize(kStepCount + 1);
+    for (auto* series : {&status_.stage_p50, &status_.stage_p99, &status_.stage_max}) series->resize(kStepCount + 2);
 }
 
 void StatusBoard::add(const PipelineFrame& frame, std::int64_t now_ns) {
     const std::lock_guard lock(mutex_);
     for (std::size_t i = 0; i < kStepCount; ++i) steps_[i].add(frame.times.wall_ms[i]);
+    pose_latency_.add(frame.pose_latency_ms);
     latency_.add(frame.latency_ms);
     if (frame.odometry.valid) {
         ++poses_;
@@ -146,7 +148,8 @@ void StatusBoard::compose_stages() {
         status_.stage_max[i] = percentiles.max;
     };
     for (std::size_t i = 0; i < kStepCount; ++i) put(i, steps_[i]);
-    put(kStepCount, latency_);
+    put(kStepCount, pose_latency_);
+    put(kStepCount + 1, latency_);
 }
 
 void StatusBoard::compose_health(std::int64_t last_packet_ns, std::int64_t now_ns) {

@@ -61,6 +61,7 @@ class StatusBoard {
 
     std::mutex mutex_;  ///< guards the rest, which workers write
     std::array<LatencyWindow, kStepCount> steps_;
+    LatencyWindow pose_latency_;
     LatencyWindow latency_;
     std::uint64_t poses_ = 0;
     std::int64_t last_pose_ns_ = 0;

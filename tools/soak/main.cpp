@@ -43,8 +43,9 @@ struct Latency {
     double max_ms = 0.0;
 };
 
-Latency latency(const status_t& status) {
-    const auto found = std::find(status.stage_name.begin(), status.stage_name.end(), "latency");
+/// @param name "latency": to the last message of a frame; "pose_latency": to its pose
+Latency latency(const status_t& status, const char* name = "latency") {
+    const auto found = std::find(status.stage_name.begin(), status.stage_name.end(), name);
     if (found == status.stage_name.end()) return {};
     const auto i = static_cast<std::size_t>(found - status.stage_name.begin());
     return {static_cast<double>(status.stage_p50[i]), static_cast<double>(status.stage_p99[i]),
@@ -67,9 +68,9 @@ double megabytes(const status_t& status) {
 }
 
 void print_head() {
-    std::printf("%6s %8s %6s %6s %7s %6s %6s %6s %6s %7s %9s %9s %9s %8s %7s %7s %7s %9s\n", "minute", "packets",
-                "lost", "twice", "garbage", "starts", "frames", "poses", "valid", "dropped", "predicted", "motion cm",
-                "place cm", "worst cm", "p50 ms", "p99 ms", "max ms", "memory MB");
+    std::printf("%6s %8s %6s %6s %7s %6s %6s %6s %6s %7s %9s %9s %9s %8s %8s %8s %7s %7s %7s %9s\n", "minute",
+                "packets", "lost", "twice", "garbage", "starts", "frames", "poses", "valid", "dropped", "predicted",
+                "motion cm", "place cm", "worst cm", "pose p50", "pose p99", "p50 ms", "p99 ms", "max ms", "memory MB");
 }
 
 void print_row(double minute, const Row& row, const Row& before) {
@@ -78,13 +79,16 @@ void print_row(double minute, const Row& row, const Row& before) {
     };
     const auto& o = row.seen;
     const Latency l = latency(o.last_status);
-    std::printf("%6.1f %8lu %6lu %6lu %7lu %6lu %6lu %6lu %6zu %7lld %9lu %9.2f %9.2f %8.2f %7.1f %7.1f %7.1f %9.1f\n",
-                minute, since(&SentTotals::packets), since(&SentTotals::lost), since(&SentTotals::duplicated),
-                since(&SentTotals::garbage), since(&SentTotals::restarts), since(&SentTotals::frames),
-                static_cast<unsigned long>(o.poses), o.valid.size(),
-                dropped(o.last_status) - dropped(before.seen.last_status), static_cast<unsigned long>(o.predicted),
-                100.0 * row.errors.motion_m, 100.0 * row.errors.position_m, 100.0 * row.errors.worst_position_m,
-                l.p50_ms, l.p99_ms, l.max_ms, megabytes(o.last_status));
+    const Latency pose = latency(o.last_status, "pose_latency");
+    std::printf(
+        "%6.1f %8lu %6lu %6lu %7lu %6lu %6lu %6lu %6zu %7lld %9lu %9.2f %9.2f %8.2f %8.1f %8.1f %7.1f %7.1f %7.1f "
+        "%9.1f\n",
+        minute, since(&SentTotals::packets), since(&SentTotals::lost), since(&SentTotals::duplicated),
+        since(&SentTotals::garbage), since(&SentTotals::restarts), since(&SentTotals::frames),
+        static_cast<unsigned long>(o.poses), o.valid.size(), dropped(o.last_status) - dropped(before.seen.last_status),
+        static_cast<unsigned long>(o.predicted), 100.0 * row.errors.motion_m, 100.0 * row.errors.position_m,
+        100.0 * row.errors.worst_position_m, pose.p50_ms, pose.p99_ms, l.p50_ms, l.p99_ms, l.max_ms,
+        megabytes(o.last_status));
     std::fflush(stdout);
 }
 

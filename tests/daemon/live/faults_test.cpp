@@ -1,9 +1,11 @@
 // Faults injected into the running program: it goes on, and says what is wrong.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <string>
 #include <thread>
 
@@ -61,6 +63,59 @@ TEST_F(Faults, StoppedForThreeSeconds) {
     EXPECT_TRUE(run.status_says(counted("pipeline_dropped_frames")));
     run.stop();
 }
+
+TEST_F(Faults, TheProcessorIsTakenAway) {
+    run.start();
+    EXPECT_TRUE(run.poses_flow());
+    run.subscriber.clear();
+    for (int i = 0; i < 16; ++i) {  // a twentieth of the time is left to it
+        run.daemon->signal(SIGSTOP);
+        std::this_thread::sleep_for(285ms);
+        run.daemon->signal(SIGCONT);
+        std::this_thread::sleep_for(15ms);
+    }
+    const auto poses = run.subscriber.poses();
+    EXPECT_GE(poses.size(), 5U) << "the newest frames are still worked on";
+    for (const auto& pose : poses) {
+        EXPECT_NE(pose.flags & pose_t::VALID, 0);
+        EXPECT_LT(std::hypot(pose.position[0], pose.position[1], pose.position[2]), 0.1) << "the sensor stands still";
+    }
+    EXPECT_TRUE(run.status_says(counted("pipeline_dropped_frames")));
+    EXPECT_TRUE(run.poses_flow(20, 4s)) << "every frame again";
+    run.stop();
+}
+
+#ifdef DLOD_STEPPED_CLOCK
+TEST_F(Faults, TheClockIsSetByAnHour) {
+    const auto clock = run.folder.path() / "clock";
+    const auto set_clock = [&](std::int64_t offset_ns) {
+        // In place: the program has mapped the file.
+        std::fstream file(clock, std::ios::binary | std::ios::in | std::ios::out);
+        file.write(reinterpret_cast<const char*>(&offset_ns), sizeof offset_ns);
+    };
+    std::ofstream(clock, std::ios::binary) << std::string(sizeof(std::int64_t), '\0');
+    run.start({}, {}, {"LD_PRELOAD=" DLOD_STEPPED_CLOCK, "DLOD_TEST_CLOCK=" + clock.string()});
+    EXPECT_TRUE(run.poses_flow());
+    const auto latest_us = [&] { return run.subscriber.poses().back().utime; };
+    constexpr std::int64_t kHour_us = 3'600'000'000;
+    const std::int64_t before_us = latest_us();
+    set_clock(1000 * kHour_us);
+    EXPECT_TRUE(run.log_says("moved by 3600", 10s));
+    EXPECT_TRUE(run.poses_flow());
+    EXPECT_NEAR(1e-6 * static_cast<double>(latest_us() - before_us), 3600.0, 10.0) << "utime follows a step forward";
+
+    const std::int64_t forward_us = latest_us();
+    set_clock(0);
+    EXPECT_TRUE(run.log_says("moved by -3600", 10s));
+    EXPECT_TRUE(run.poses_flow());
+    EXPECT_GT(latest_us(), forward_us) << "utime never goes back";
+    EXPECT_TRUE(run.status_says([](const status_t& status) {
+        return status.health == status_t::OK && status.stage_max.back() < 1000.0F &&
+               test::counter(status, "pipeline_dropped_frames") == 0;
+    })) << "neither latencies nor health are taken in";
+    run.stop();
+}
+#endif
 
 TEST_F(Faults, DiskFullWhileRecordingAndWriting) {
     run.write_config("host: \"" + sensor->host() + "\"",

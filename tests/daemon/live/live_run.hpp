@@ -46,13 +46,14 @@ class LiveRun {
                                 << "\"}\n"
                                 << more;
     }
-    void start(const std::vector<std::string>& arguments = {}, std::optional<unsigned long> largest_file = {}) {
+    /// @param environment beyond systemd's, "NAME=value"
+    void start(const std::vector<std::string>& arguments = {}, std::optional<unsigned long> largest_file = {},
+               std::vector<std::string> environment = {}) {
         std::vector<std::string> command = {DLOD_BINARY, "run", "-c", config().string()};
         command.insert(command.end(), arguments.begin(), arguments.end());
+        environment.insert(environment.end(), {systemd.variable(), "STATE_DIRECTORY=" + folder.path().string()});
         daemon = std::make_unique<ChildProcess>(
-            command,
-            ChildProcess::Options{.environment = {systemd.variable(), "STATE_DIRECTORY=" + folder.path().string()},
-                                  .largest_file = largest_file});
+            command, ChildProcess::Options{.environment = environment, .largest_file = largest_file});
         EXPECT_TRUE(systemd.wait_for("READY=1", 10s)) << daemon->output();
     }
     /// A clean stop, within the time that is asked of it.

@@ -36,7 +36,8 @@ TEST(SensorChanges, AwaitedUnpluggedRestartedAndReplaced) {
 
     sensor.plug_in();
     EXPECT_TRUE(run.poses_flow());
-    EXPECT_TRUE(run.status_says(health(status_t::OK, "")));
+    // A frame dropped on a busy machine is remembered for ten seconds.
+    EXPECT_TRUE(run.status_says(health(status_t::OK, ""), 25s));
 
     sensor.restart();
     EXPECT_TRUE(run.poses_flow()) << "after a restart: init id, clock and frame ids begin anew";
@@ -59,7 +60,7 @@ TEST(SensorChanges, AwaitedUnpluggedRestartedAndReplaced) {
     EXPECT_TRUE(run.status_says(sensor_is("v3.1.0")));
     EXPECT_TRUE(run.poses_flow());
     EXPECT_TRUE(run.status_says(
-        [](const status_t& s) { return test::counter(s, "sensor_changes") == 3 && s.health == 0; }, 15s));
+        [](const status_t& s) { return test::counter(s, "sensor_changes") == 3 && s.health == 0; }, 25s));
     EXPECT_EQ(run.systemd.messages().find("STOPPING"), std::string::npos);
     run.stop();
 }

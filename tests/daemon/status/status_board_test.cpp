@@ -51,11 +51,14 @@ TEST_F(StatusBoardTest, ACounterThatBeginsAnewGivesNoRate) {
 
 TEST_F(StatusBoardTest, PercentilesAreOfTheLastFrames) {
     for (int i = 1; i <= 100; ++i) {
+        frame_.pose_latency_ms = 0.5F * static_cast<float>(i);
         frame_.latency_ms = static_cast<float>(i);
         pose_at(2.0);
     }
     const auto status = at(2.0, {}, 2.0);
     ASSERT_EQ(status.stage_name.back(), "latency");
+    ASSERT_EQ(status.stage_name[kStepCount], "pose_latency");
+    EXPECT_EQ(status.stage_p50[kStepCount], 25.0F);
     EXPECT_EQ(status.stage_p50.back(), 50.0F);
     EXPECT_EQ(status.stage_p99.back(), 99.0F);
     EXPECT_EQ(status.stage_max.back(), 100.0F);
