@@ -109,9 +109,12 @@ DynamicState MotionBelief::fused(const MotionCues& cues, const DynamicStateConfi
     log_odds_ = std::clamp(log_odds_ + step, config.static_log_odds - 0.5, kMaxLogOdds);
     rest(cues, config);
     if (state_ == DynamicState::kDynamic) {
-        // Where it has come to rest, the past says the same as where it has never moved.
+        // Where it has come to rest, the past says the same as where it has never moved: but what has long been
+        // dynamic was none of that.
         const bool mistaken = log_odds_ <= config.static_log_odds;
-        rested_ = rest_s_ >= (mistaken ? kResting : 1.0) * config.rest_time_s;
+        dynamic_s_ += cues.dt_s;
+        const bool halted = mistaken && dynamic_s_ >= config.rest_time_s;
+        rested_ = rest_s_ >= (halted ? kResting : 1.0) * config.rest_time_s;
         off_anchor_ = 0;
         if (!rested_ && !mistaken) return state_;
         log_odds_ = std::min(log_odds_, 0.0);
@@ -128,6 +131,7 @@ DynamicState MotionBelief::fused(const MotionCues& cues, const DynamicStateConfi
     }
     if (log_odds_ >= config.dynamic_log_odds && detections_ >= config.min_hits) {
         rest_s_ = 0.0;
+        dynamic_s_ = 0.0;
         anchor_m_ = cues.position_m;
         return DynamicState::kDynamic;
     }

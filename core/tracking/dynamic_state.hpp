@@ -50,6 +50,7 @@ class MotionBelief {
     DynamicState state_ = DynamicState::kUndefined;
     double log_odds_ = 0.0;
     double rest_s_ = 0.0;
+    double dynamic_s_ = 0.0;  ///< in the state dynamic, the last time
     int detections_ = 0;
     Eigen::Vector2d anchor_m_ = Eigen::Vector2d::Zero();  ///< where it has rested for rest_s_
     int off_anchor_ = 0;                                  ///< consecutive detections away from there

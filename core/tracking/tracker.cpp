@@ -100,9 +100,11 @@ bool is_limb_of(const TrackedObject& host, const TrackedObject& guest) {
            share_inside(guest.box(), host.box(), kPartMargin_m) > kInside;
 }
 
-/// As tall as the other, and seen for long: an object of its own, whatever an occluder has left of either.
+/// It moves, is as tall as the other, and has been seen for long: an object of its own, whatever an occluder has left
+/// of either.
 bool is_body_beside(const TrackedObject& host, const TrackedObject& guest) {
-    return guest.hits() >= kYoungHits && guest.box().size_m.z() > kLeastBody * host.box().size_m.z();
+    return guest.state() == DynamicState::kDynamic && guest.hits() >= kYoungHits &&
+           guest.box().size_m.z() > kLeastBody * host.box().size_m.z();
 }
 
 /// Whether a track that is seen may be the object of one that is not: what moves is not taken for something that rests,
