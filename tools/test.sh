@@ -1,17 +1,18 @@
 #!/usr/bin/env bash
 # Installs what is missing, builds dlod (Release, in build/) and runs all tests. Can be run again at any time.
-# usage: tools/test.sh [--sanitizers] [CTEST_ARGUMENT...]
-#   --sanitizers   afterwards the tests of core and driver under AddressSanitizer with UndefinedBehaviorSanitizer, and
-#                  those of the pipeline under ThreadSanitizer
+# usage: tools/test.sh [--sanitizers | --thread-sanitizer] [CTEST_ARGUMENT...]
+#   --thread-sanitizer   afterwards the pipeline and the whole program, live and in replay, under ThreadSanitizer
+#   --sanitizers         that, and all tests under AddressSanitizer with UndefinedBehaviorSanitizer
 # Further arguments go to ctest: tools/test.sh -R tracking
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-sanitizers=no
-if [[ ${1:-} == --sanitizers ]]; then
-    sanitizers=yes
-    shift
-fi
+sanitizers=()
+case ${1:-} in
+    --sanitizers) sanitizers=(thread address) ;;
+    --thread-sanitizer) sanitizers=(thread) ;;
+esac
+((${#sanitizers[@]} == 0)) || shift
 tools/install-deps.sh
 tools/install-deps.sh --package || echo "test.sh: the tests of the package that need these are skipped" >&2
 
@@ -24,20 +25,23 @@ cmake --build build -j "$jobs"
 step "tests"
 ctest --test-dir build -j 2 --output-on-failure "$@"
 
-# sanitize NAME FLAGS TARGETS TEST_PATTERN: builds the targets in build-NAME and runs the tests whose names match.
+# sanitize NAME FLAGS TOOLS TARGETS TEST_PATTERN: builds the targets in build-NAME and runs the tests whose names match.
 sanitize() {
     step "$1 sanitizer: build"
-    # Little optimisation compiles fast and keeps stacks readable; asserts are on.
+    # Little optimisation compiles fast and keeps stacks readable; asserts are on. The simulator that sends packets in
+    # time is the fast one.
     cmake -S . -B "build-$1" -G Ninja -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" \
-        -DDLOD_SANITIZE="$2" -DDLOD_BUILD_TOOLS=OFF
+        -DDLOD_SANITIZE="$2" -DDLOD_BUILD_TOOLS="$3" -DDLOD_SIM_BINARY="$PWD/build/tools/sim/dlod-sim"
     # shellcheck disable=SC2086  # several targets
-    cmake --build "build-$1" -j "$jobs" --target $3
+    cmake --build "build-$1" -j "$jobs" --target $4
     step "$1 sanitizer: tests"
-    ctest --test-dir "build-$1" -j 2 --output-on-failure -R "$4"
+    ctest --test-dir "build-$1" -j 2 --output-on-failure -R "$5"
 }
-if [[ $sanitizers == yes ]]; then
-    sanitize address address,undefined "tests_core tests_driver" '^(core_|driver/)'
-    sanitize thread thread test_daemon_pipeline '^daemon_pipeline/'
-fi
+for sanitizer in "${sanitizers[@]}"; do
+    case $sanitizer in
+        thread) sanitize thread thread OFF "test_daemon_pipeline test_daemon_live" '^daemon_(pipeline|live)/' ;;
+        address) sanitize address address,undefined ON "tests_core tests_driver tests_daemon tests_tools" '/' ;;
+    esac
+done
 
 step "all tests passed"

@@ -30,7 +30,8 @@ void set_up_thread(const char* name, const PipelineConfig& config) {
 }
 
 void lock_memory(const PipelineConfig& config) {
-    if (!config.lock_memory || ::mlockall(MCL_CURRENT | MCL_FUTURE) == 0) return;
+    // What has been used stays; the heap's addresses in reserve and the stacks' depths need no memory for it.
+    if (!config.lock_memory || ::mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0) return;
     spdlog::warn("pipeline.lock_memory: refused ({}); the service needs LimitMEMLOCK=infinity", std::strerror(errno));
 }
 
