@@ -84,15 +84,16 @@ int main(int argc, char** argv) {
     auto* send_command_line =
         app.add_subcommand("command", "tell a running dlod to do something, and print its answer");
     const std::map<std::string, int> commands = {{"save-map", dlod::command_t::SAVE_MAP},
-                                                         {"restart-odometry", dlod::command_t::RESTART_ODOMETRY},
-                                                         {"log-level", dlod::command_t::SET_LOG_LEVEL}};
+                                                 {"restart-odometry", dlod::command_t::RESTART_ODOMETRY},
+                                                 {"log-level", dlod::command_t::SET_LOG_LEVEL}};
+    std::string command_name;
     send_command_line
-        ->add_option("COMMAND", send_arguments.command,
+        ->add_option("COMMAND", command_name,
                      "save-map [NAME]: NAME.pcd and NAME.ply in saved_maps.folder, by default named by the time; "
                      "restart-odometry: pose, map and tracks begin anew; log-level LEVEL: trace, debug, info, warning, "
                      "error or off")
         ->required()
-        ->transform(CLI::CheckedTransformer(commands));
+        ->check(CLI::IsMember(&commands));
     send_command_line->add_option("ARGUMENT", send_arguments.argument, "of the command");
     send_command_line->add_option("--timeout", send_arguments.timeout_s, "seconds to wait for the answer; default: 15")
         ->check(CLI::Range(0.1, 3600.0));
@@ -132,7 +133,10 @@ int main(int argc, char** argv) {
         ExitCode code = ExitCode::kSuccess;
         if (*run_command) code = run(run_arguments);
         if (*replay_command) code = replay(replay_arguments);
-        if (*send_command_line) code = send_command(send_arguments);
+        if (*send_command_line) {
+            send_arguments.command = commands.at(command_name);
+            code = send_command(send_arguments);
+        }
         if (*doctor_command) code = doctor(doctored);
         if (*info_command) code = info(info_file, info_metadata);
         if (*check_command) code = check_config(checked, checked_metadata);

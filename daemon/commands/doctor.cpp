@@ -37,7 +37,7 @@ ExitCode doctor(const ConfigSources& sources) {
                                  check_realtime_priority(config.pipeline.realtime_priority),
                                  check_locked_memory(config.pipeline.lock_memory),
                                  check_clock_synchronised(),
-                                 check_sensor(config.sensor.host),
+                                 check_sensor(config.sensor.host, config.sensor.metadata),
                                  check_packets(config.sensor, kPacketTime)};
     if (config.lcm.url.empty()) checks.push_back(check_multicast(kDefaultLcmUrl));
     if (!config.lcm.url.empty() && config.lcm.url != "none") checks.push_back(check_multicast(config.lcm.url));

@@ -1,10 +1,8 @@
 #include <cstdio>
-#include <deque>
-#include <memory>
 
 #include "daemon/commands/capture_metadata.hpp"
 #include "daemon/commands/commands.hpp"
-#include "driver/frame_builder.hpp"
+#include "driver/frame_counter.hpp"
 #include "driver/metadata.hpp"
 #include "driver/pcap_source.hpp"
 
@@ -27,28 +25,17 @@ void print_sensor(const driver::SensorInfo& sensor) {
 
 void print_capture(const std::filesystem::path& file, const driver::SensorInfo& sensor) {
     driver::PcapSource source(file);
-    Frame frame(sensor.model);
-    Frame next_frame(sensor.model);
-    std::deque<Frame*> free = {&frame, &next_frame};
-    driver::FrameBuilder builder(
-        sensor, {},
-        [&]() -> Frame* {
-            if (free.empty()) return nullptr;
-            Frame* const taken = free.front();
-            free.pop_front();
-            return taken;
-        },
-        [&](Frame* emitted) { free.push_back(emitted); });
+    driver::FrameCounter counter(sensor);
     std::int64_t first_ns = 0;
     std::int64_t last_ns = 0;
     for (auto batch = source.next(); batch.status != driver::SourceStatus::kEnd; batch = source.next()) {
         for (const auto& packet : batch.packets) {
             if (first_ns == 0) first_ns = packet.receive_ns;
             last_ns = packet.receive_ns;
-            builder.push(packet);
+            counter.push(packet);
         }
     }
-    builder.flush();
+    counter.flush();
     for (const auto& warning : source.take_warnings()) std::printf("warning   %s\n", warning.c_str());
     std::printf("duration  %.3f s\n", 1e-9 * static_cast<double>(last_ns - first_ns));
     // Zeros say nothing but the totals'.
@@ -60,7 +47,7 @@ void print_capture(const std::filesystem::path& file, const driver::SensorInfo& 
     std::printf("capture\n");
     source.visit_counters(print);
     std::printf("packets and frames\n");
-    builder.counters().visit(print);
+    counter.counters().visit(print);
 }
 
 }  // namespace

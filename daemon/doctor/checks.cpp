@@ -167,10 +167,14 @@ Check check_disk(const std::filesystem::path& directory, std::uint64_t wanted_by
     return check;
 }
 
-Check check_sensor(const std::string& host) {
+Check check_sensor(const std::string& host, const std::string& metadata) {
     Check check{"sensor", Verdict::kGood, "", ""};
+    if (host.empty() && metadata.empty()) {
+        return {"sensor", Verdict::kFailure, "none is named: neither sensor.host nor sensor.metadata are configured",
+                "sensor.host: the sensor's name or address, in the configuration; doctor reads the file after -c"};
+    }
     if (host.empty()) {
-        check.finding = "sensor.host not configured: metadata come from a file";
+        check.finding = "not asked: metadata come from " + metadata;
         return check;
     }
     try {

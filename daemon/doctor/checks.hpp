@@ -40,6 +40,6 @@ Check check_clock_synchronised();
 Check check_disk(const std::filesystem::path& directory, std::uint64_t wanted_bytes);
 
 /// Does the sensor answer over HTTP? An empty host is good: metadata come from a file then.
-Check check_sensor(const std::string& host);
+Check check_sensor(const std::string& host, const std::string& metadata);
 
 }  // namespace dlod::daemon

@@ -2,15 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <deque>
 #include <optional>
 #include <string>
 
-#include "core/types/frame.hpp"
 #include "daemon/sensor/sensor_client.hpp"
 #include "daemon/sensor/sensor_watch.hpp"
 #include "daemon/sensor/udp_options.hpp"
-#include "driver/frame_builder.hpp"
+#include "driver/frame_counter.hpp"
 #include "driver/udp_source.hpp"
 
 namespace dlod::daemon {
@@ -26,21 +24,11 @@ constexpr const char* kName = "packets";
 PacketCount count_packets(const SensorConfig& config, const driver::SensorInfo& sensor,
                           std::chrono::milliseconds time) {
     driver::UdpSource source(udp_options(config, sensor));
-    Frame frames[2] = {Frame(sensor.model), Frame(sensor.model)};
-    std::deque<Frame*> free = {&frames[0], &frames[1]};
-    driver::FrameBuilder builder(
-        sensor, {},
-        [&]() -> Frame* {
-            if (free.empty()) return nullptr;
-            Frame* const taken = free.front();
-            free.pop_front();
-            return taken;
-        },
-        [&](Frame* emitted) { free.push_back(emitted); });
+    driver::FrameCounter counter(sensor);
     for (const auto end = Clock::now() + time; Clock::now() < end;) {
-        for (const auto& packet : source.next().packets) builder.push(packet);
+        for (const auto& packet : source.next().packets) counter.push(packet);
     }
-    const auto& counters = builder.counters();
+    const auto& counters = counter.counters();
     return {.packets = counters.packets.value(),
             .lidar_packets = counters.lidar_packets.value(),
             .lost_packets = counters.lost_packets.value(),
@@ -87,8 +75,7 @@ Check judge_packets(const PacketCount& count, std::chrono::milliseconds time) {
 
 Check check_packets(const SensorConfig& config, std::chrono::milliseconds time) {
     if (config.metadata.empty() && config.host.empty()) {
-        return {kName, Verdict::kWarning, "not looked for: neither sensor.metadata nor sensor.host are configured",
-                "dlod doctor -c FILE"};
+        return {kName, Verdict::kWarning, "not looked for: no sensor is named", ""};
     }
     try {
         const auto file = configured_metadata(config);

@@ -313,7 +313,8 @@ std::optional<SensorMetadata> configured_metadata(const SensorConfig& config) {
     if (config.metadata.empty()) {
         if (!config.host.empty()) return std::nullopt;
         throw ConfigError(
-            "sensor.metadata: a live run needs the sensor's metadata file, or sensor.host to ask the sensor itself");
+            "no sensor is named: set sensor.host, its name or address, in the configuration, or sensor.metadata, a "
+            "file");
     }
     std::ifstream file(config.metadata, std::ios::binary);
     std::string json{std::istreambuf_iterator<char>(file), {}};

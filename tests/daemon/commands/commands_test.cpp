@@ -80,6 +80,8 @@ TEST_F(CommandsTest, HelpAndVersion) {
     EXPECT_TRUE(ends(dlod({}), 2, {}));
     EXPECT_TRUE(ends(dlod({"replay"}), 2, {"PCAP"}));
     EXPECT_TRUE(ends(dlod({"fly"}), 2, {}));
+    EXPECT_TRUE(ends(dlod({"command", "fly"}), 2, {"save-map"}));
+    EXPECT_TRUE(ends(dlod({"run"}), 3, {"sensor.host", "sensor.metadata"}));
 }
 
 TEST_F(CommandsTest, DoctorNamesRemedies) {

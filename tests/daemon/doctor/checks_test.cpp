@@ -37,7 +37,7 @@ TEST(DoctorChecks, MulticastHasARouteOrNamesTheCommand) {
 TEST(DoctorChecks, WhatIsNotConfiguredIsGood) {
     EXPECT_EQ(check_realtime_priority(0).verdict, Verdict::kGood);
     EXPECT_EQ(check_locked_memory(false).verdict, Verdict::kGood);
-    EXPECT_EQ(check_sensor("").verdict, Verdict::kGood);
+    EXPECT_EQ(check_sensor("", "sensor.json").verdict, Verdict::kGood);
 }
 
 TEST(DoctorChecks, DiskTellsMissingAndFull) {
@@ -49,8 +49,14 @@ TEST(DoctorChecks, DiskTellsMissingAndFull) {
     EXPECT_NE(full.remedy.find(here.string()), std::string::npos);
 }
 
+TEST(DoctorChecks, WithoutASensorNothingCanRun) {
+    const Check check = check_sensor("", "");
+    EXPECT_EQ(check.verdict, Verdict::kFailure);
+    EXPECT_NE(check.remedy.find("sensor.host"), std::string::npos);
+}
+
 TEST(DoctorChecks, AnAbsentSensorIsAFailureWithItsHost) {
-    const Check check = check_sensor("127.0.0.1:1");
+    const Check check = check_sensor("127.0.0.1:1", "");
     EXPECT_EQ(check.verdict, Verdict::kFailure);
     EXPECT_NE(check.finding.find("127.0.0.1:1"), std::string::npos);
     EXPECT_FALSE(check.remedy.empty());
