@@ -37,11 +37,14 @@ bool is_thin(const Image<float>& range_m, PixelIndex pixel) {
 }  // namespace
 
 EvidenceImage::EvidenceImage(const SensorModel& sensor, const FreeSpaceConfig& config)
-    : width_(sensor.width),
-      references_(sensor, config.octaves),
+    : references_(sensor, config.octaves),
       free_space_(sensor, config, references_.narrow_bits(), references_.wide_bits()),
       image_(sensor.height, sensor.width, 0) {
     requested_.reserve(sensor.pixels());
+    for (int r = 0; r < sensor.height; ++r) {
+        for (int c = 0; c < sensor.width; ++c)
+            block_of_.push_back(static_cast<std::uint8_t>(c * Reference::kBlocks / sensor.width));
+    }
     points_.block_end.assign(Reference::kBlocks, 0);
 }
 
@@ -60,10 +63,8 @@ void EvidenceImage::request(PixelIndex pixel) {
 }
 
 void EvidenceImage::sort_into_blocks(const OdometryResult& odometry) {
-    const auto width = static_cast<std::uint32_t>(width_);
-    const auto block_of = [width](PixelIndex pixel) { return pixel % width * Reference::kBlocks / width; };
     std::fill(points_.block_end.begin(), points_.block_end.end(), 0);
-    for (const PixelIndex pixel : requested_) ++points_.block_end[block_of(pixel)];
+    for (const PixelIndex pixel : requested_) ++points_.block_end[block_of_[pixel]];
     std::uint32_t sum = 0;
     for (std::uint32_t& end : points_.block_end) {
         const std::uint32_t count = end;
@@ -73,7 +74,7 @@ void EvidenceImage::sort_into_blocks(const OdometryResult& odometry) {
     points_.pixel.resize(sum);
     for (auto* v : {&points_.x, &points_.y, &points_.z}) v->resize(sum);
     for (const PixelIndex pixel : requested_) {
-        const std::uint32_t i = points_.block_end[block_of(pixel)]++;
+        const std::uint32_t i = points_.block_end[block_of_[pixel]]++;
         points_.pixel[i] = pixel;
         points_.x[i] = odometry.x[pixel];
         points_.y[i] = odometry.y[pixel];

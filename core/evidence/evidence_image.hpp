@@ -33,12 +33,12 @@ class EvidenceImage {
   private:
     void sort_into_blocks(const OdometryResult& odometry);
 
-    int width_;
     ReferenceImages references_;
     FreeSpace free_space_;
     std::vector<const Reference*> selected_;
     const Reference* now_ = nullptr;
     Image<std::uint8_t> image_;
+    std::vector<std::uint8_t> block_of_;  ///< [H * W] block of the pixel's column
     std::vector<PixelIndex> requested_;
     CandidatePoints points_;
 };

@@ -15,17 +15,8 @@ void mark_occlusion(std::span<const PixelIndex> pixels, const Image<float>& rang
     const int reference = static_cast<int>(pixels.front()) % width;
     std::span<int> left = row_ends.first(static_cast<std::size_t>(height));
     std::span<int> right = row_ends.subspan(static_cast<std::size_t>(height), static_cast<std::size_t>(height));
-    int top = height;
-    int bottom = -1;
-    for (const PixelIndex p : pixels) {
-        const int row = static_cast<int>(p) / width;
-        top = std::min(top, row);
-        bottom = std::max(bottom, row);
-    }
-    for (int r = top; r <= bottom; ++r) {
-        left[static_cast<std::size_t>(r)] = width;
-        right[static_cast<std::size_t>(r)] = -width;
-    }
+    std::fill(left.begin(), left.end(), width);
+    std::fill(right.begin(), right.end(), -width);
     for (const PixelIndex p : pixels) {
         const auto row = static_cast<std::size_t>(static_cast<int>(p) / width);
         int column = static_cast<int>(p) % width - reference;
@@ -48,7 +39,7 @@ void mark_occlusion(std::span<const PixelIndex> pixels, const Image<float>& rang
     int rows = 0;
     int hidden_left = 0;
     int hidden_right = 0;
-    for (int r = top; r <= bottom; ++r) {
+    for (int r = 0; r < height; ++r) {
         const auto row = static_cast<std::size_t>(r);
         if (right[row] < left[row]) continue;
         ++rows;

@@ -106,7 +106,7 @@ ReferenceImages::ReferenceImages(const SensorModel& sensor, int levels)
       pool_(2 * static_cast<std::size_t>(levels) + 1),
       users_(pool_.size(), 0),
       slots_(2 * static_cast<std::size_t>(levels), -1),
-      units_(sensor.height, sensor.width) {
+      units_(kRowsHigh, sensor.width) {
     const double column_rad = 2.0 * std::numbers::pi / sensor.width;
     while (sensor.width % (2 << narrow_bits_) == 0 && (2 << narrow_bits_) * column_rad < 1.5 * kNarrowCell_rad)
         ++narrow_bits_;
@@ -220,14 +220,16 @@ void ReferenceImages::fill_cells(Windows& windows, int rows, int bits, std::uint
 void ReferenceImages::fill_windows(const StructuredCloud& cloud, Reference& reference) {
     const int width = sensor_.width;
     const int height = sensor_.height;
-    quantize(static_cast<int>(units_.size()), cloud.range_m.data(), units_.data());
+    const auto units = [this](int r) { return units_.row(r % kRowsHigh); };
     const auto row = [this](int r) -> Windows& { return rows_[static_cast<std::size_t>(r) % rows_.size()]; };
     const auto stack = [&](int r) {
-        stack_rows(width, units_.row(std::max(0, r - 1)), units_.row(r), units_.row(std::min(height - 1, r + 1)),
-                   row(r).low(), row(r).high(), row(r).missing());
+        if (r + 1 < height) quantize(width, cloud.range_m.row(r + 1), units(r + 1));
+        stack_rows(width, units(std::max(0, r - 1)), units(r), units(std::min(height - 1, r + 1)), row(r).low(),
+                   row(r).high(), row(r).missing());
     };
     std::uint32_t* narrow = reference.cells.data();
     std::uint32_t* wide = narrow + (sensor_.pixels() >> narrow_bits_);
+    quantize(width, cloud.range_m.row(0), units(0));
     stack(0);
     for (int r = 0; r < height; ++r) {
         if (r + 1 < height) stack(r + 1);

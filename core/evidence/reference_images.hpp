@@ -82,8 +82,9 @@ class ReferenceImages {
     /// @param rows of the image that a window covers
     void fill_cells(Windows& windows, int rows, int bits, std::uint32_t* cells);
 
-    Image<std::uint16_t> units_;   ///< ranges of the frame being inserted
-    std::array<Windows, 3> rows_;  ///< three rows high, of the row at hand and its neighbours
+    static constexpr int kRowsHigh = 3;  // windows of rows_
+    Image<std::uint16_t> units_;         ///< ranges of the row being stacked and its neighbours, row r at r % kRowsHigh
+    std::array<Windows, kRowsHigh> rows_;  ///< of the row at hand and its neighbours, likewise
     Windows joined_, halved_, halved_again_;
 };
 

@@ -10,7 +10,8 @@ constexpr int kMostUnknown = 4;  // points to one that has something of the subm
 }  // namespace
 
 void ResidualImage::update(const OdometryResult& odometry) {
-    image_.fill(0.0F);
+    for (const PixelIndex pixel : filled_) image_[pixel] = 0.0F;
+    filled_.assign(odometry.residual_pixel.begin(), odometry.residual_pixel.end());
     for (std::size_t i = 0; i < odometry.residual_pixel.size(); ++i)
         image_[odometry.residual_pixel[i]] = odometry.residual_m[i];
 }

@@ -18,6 +18,7 @@ class ResidualImage {
 
   private:
     Image<float> image_;
+    std::vector<PixelIndex> filled_;  ///< where it is not 0
 };
 
 struct AverageResidual {
