@@ -9,9 +9,9 @@ namespace {
 constexpr std::size_t kLargestDatagram = 65535;
 
 struct Key {
+    std::uint32_t id = 0;  // first, since it tells most datagrams apart
     IpAddress source{};
     IpAddress destination{};
-    std::uint32_t id = 0;
     std::uint32_t vlan = 0;
     std::uint8_t protocol = 0;
 
@@ -125,10 +125,13 @@ Bytes IpReassembly::add(const IpPacket& fragment, std::uint32_t vlan, std::int64
     }
     const Piece piece{fragment.offset, static_cast<std::uint32_t>(fragment.offset + size)};
 
-    const Key key{fragment.source, fragment.destination, fragment.id, vlan, fragment.protocol};
-    const auto found = std::find_if(slots_.begin(), slots_.end(),
-                                    [&](const auto& s) { return s->state != State::kFree && s->key == key; });
-    Slot* slot = found == slots_.end() ? nullptr : found->get();
+    const Key key{fragment.id, fragment.source, fragment.destination, vlan, fragment.protocol};
+    const auto holds_key = [&](const Slot& s) { return s.state != State::kFree && s.key == key; };
+    Slot* slot = recent_ != nullptr && holds_key(*recent_) ? recent_ : nullptr;
+    if (slot == nullptr) {
+        const auto found = std::find_if(slots_.begin(), slots_.end(), [&](const auto& s) { return holds_key(*s); });
+        if (found != slots_.end()) slot = found->get();
+    }
     if (slot != nullptr && expired(*slot, time_ns)) give_up(*slot, counters_.timed_out);
 
     const auto repeats = [&](const Slot& s) {
@@ -154,6 +157,7 @@ Bytes IpReassembly::add(const IpPacket& fragment, std::uint32_t vlan, std::int64
         // The id of a delivered datagram with other bytes, or a first fragment after a contradiction: a new datagram.
         begin(*slot, time_ns);
     }
+    recent_ = slot;
 
     const auto position = [&] {
         return std::lower_bound(slot->pieces.begin(), slot->pieces.end(), piece,

@@ -75,6 +75,7 @@ class IpReassembly {
     ReassemblyLimits limits_;
     std::vector<std::unique_ptr<Slot>> slots_;
     std::int64_t next_sweep_ns_ = 0;
+    Slot* recent_ = nullptr;     ///< of the last fragment: the next one is mostly of the same datagram
     Slot* delivered_ = nullptr;  ///< by the call of add() before
     ReassemblyCounters counters_;
 };
