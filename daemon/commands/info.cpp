@@ -2,7 +2,7 @@
 
 #include "daemon/commands/capture_metadata.hpp"
 #include "daemon/commands/commands.hpp"
-#include "driver/frame_counter.hpp"
+#include "driver/frame_viewer.hpp"
 #include "driver/metadata.hpp"
 #include "driver/pcap_source.hpp"
 
@@ -25,17 +25,17 @@ void print_sensor(const driver::SensorInfo& sensor) {
 
 void print_capture(const std::filesystem::path& file, const driver::SensorInfo& sensor) {
     driver::PcapSource source(file);
-    driver::FrameCounter counter(sensor);
+    driver::FrameViewer frames(sensor);
     std::int64_t first_ns = 0;
     std::int64_t last_ns = 0;
     for (auto batch = source.next(); batch.status != driver::SourceStatus::kEnd; batch = source.next()) {
         for (const auto& packet : batch.packets) {
             if (first_ns == 0) first_ns = packet.receive_ns;
             last_ns = packet.receive_ns;
-            counter.push(packet);
+            frames.push(packet);
         }
     }
-    counter.flush();
+    frames.flush();
     for (const auto& warning : source.take_warnings()) std::printf("warning   %s\n", warning.c_str());
     std::printf("duration  %.3f s\n", 1e-9 * static_cast<double>(last_ns - first_ns));
     // Zeros say nothing but the totals'.
@@ -47,7 +47,7 @@ void print_capture(const std::filesystem::path& file, const driver::SensorInfo& 
     std::printf("capture\n");
     source.visit_counters(print);
     std::printf("packets and frames\n");
-    counter.counters().visit(print);
+    frames.counters().visit(print);
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 #include "daemon/sensor/sensor_client.hpp"
 #include "daemon/sensor/sensor_watch.hpp"
 #include "daemon/sensor/udp_options.hpp"
-#include "driver/frame_counter.hpp"
+#include "driver/frame_viewer.hpp"
 #include "driver/udp_source.hpp"
 
 namespace dlod::daemon {
@@ -24,11 +24,11 @@ constexpr const char* kName = "packets";
 PacketCount count_packets(const SensorConfig& config, const driver::SensorInfo& sensor,
                           std::chrono::milliseconds time) {
     driver::UdpSource source(udp_options(config, sensor));
-    driver::FrameCounter counter(sensor);
+    driver::FrameViewer frames(sensor);
     for (const auto end = Clock::now() + time; Clock::now() < end;) {
-        for (const auto& packet : source.next().packets) counter.push(packet);
+        for (const auto& packet : source.next().packets) frames.push(packet);
     }
-    const auto& counters = counter.counters();
+    const auto& counters = frames.counters();
     return {.packets = counters.packets.value(),
             .lidar_packets = counters.lidar_packets.value(),
             .lost_packets = counters.lost_packets.value(),

@@ -4,12 +4,12 @@
 
 #include <fstream>
 #include <map>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "driver/frame_builder.hpp"
+#include "driver/frame_viewer.hpp"
 #include "driver/pcap_source.hpp"
 #include "tests/support/test_data.hpp"
 
@@ -237,31 +237,16 @@ struct Replay {
 Replay replay(const std::string& metadata, const std::string& capture) {
     const SensorInfo info = load_metadata(*dlod::test::data_path("ouster/" + metadata));
     PcapSource source(*dlod::test::data_path("ouster/" + capture));
-    std::vector<std::unique_ptr<Frame>> pool;
-    std::vector<Frame*> free;
-    for (int i = 0; i < 2; ++i) {
-        pool.push_back(std::make_unique<Frame>(info.model));
-        free.push_back(pool.back().get());
-    }
     Replay result;
-    FrameBuilder builder(
-        info, {},
-        [&]() -> Frame* {
-            if (free.empty()) return nullptr;
-            Frame* frame = free.back();
-            free.pop_back();
-            return frame;
-        },
-        [&](Frame* frame) {
-            result.frames.push_back(frame->header);
-            result.imu_samples.push_back(frame->imu.size());
-            free.push_back(frame);
-        });
+    FrameViewer frames(info, [&](const Frame& frame) {
+        result.frames.push_back(frame.header);
+        result.imu_samples.push_back(frame.imu.size());
+    });
     for (PacketBatch batch = source.next(); batch.status == SourceStatus::kPackets; batch = source.next()) {
-        for (const Packet& packet : batch.packets) builder.push(packet);
+        for (const Packet& packet : batch.packets) frames.push(packet);
     }
-    builder.flush();
-    result.counters = builder.counters();
+    frames.flush();
+    result.counters = frames.counters();
     return result;
 }
 

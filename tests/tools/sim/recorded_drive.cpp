@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
+
+#include "driver/frame_viewer.hpp"
 
 namespace dlod::tools::sim::test {
 
@@ -27,30 +28,13 @@ RecordedDrive record(const DriveSettings& s) {
 }
 
 driver::FrameBuilderCounters decode(const RecordedDrive& drive, const std::function<void(Frame&)>& see) {
-    std::vector<std::unique_ptr<Frame>> frames;
-    std::vector<Frame*> free;
-    for (int i = 0; i < 4; ++i) {
-        frames.push_back(std::make_unique<Frame>(drive.sensor.model));
-        free.push_back(frames.back().get());
-    }
-    driver::FrameBuilder builder(
-        drive.sensor, {},
-        [&]() -> Frame* {
-            if (free.empty()) return nullptr;
-            Frame* frame = free.back();
-            free.pop_back();
-            return frame;
-        },
-        [&](Frame* frame) {
-            see(*frame);
-            free.push_back(frame);
-        });
+    driver::FrameViewer frames(drive.sensor, see);
     for (const Datagram& d : drive.datagrams) {
         const std::uint16_t port = d.imu ? drive.sensor.imu_port : drive.sensor.lidar_port;
-        builder.push({.data = d.bytes, .receive_ns = d.send_ns, .destination_port = port});
+        frames.push({.data = d.bytes, .receive_ns = d.send_ns, .destination_port = port});
     }
-    builder.flush();
-    return builder.counters();
+    frames.flush();
+    return frames.counters();
 }
 
 }  // namespace dlod::tools::sim::test

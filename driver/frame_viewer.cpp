@@ -1,10 +1,13 @@
-#include "driver/frame_counter.hpp"
+#include "driver/frame_viewer.hpp"
+
+#include <utility>
 
 namespace dlod::driver {
 
-FrameCounter::FrameCounter(const SensorInfo& info)
+FrameViewer::FrameViewer(const SensorInfo& info, See see)
     : frames_{Frame(info.model), Frame(info.model)},
       free_{&frames_[0], &frames_[1]},
+      see_(std::move(see)),
       builder_(
           info, {},
           [this]() -> Frame* {
@@ -13,6 +16,9 @@ FrameCounter::FrameCounter(const SensorInfo& info)
               free_.pop_back();
               return taken;
           },
-          [this](Frame* emitted) { free_.push_back(emitted); }) {}
+          [this](Frame* emitted) {
+              if (see_) see_(*emitted);
+              free_.push_back(emitted);
+          }) {}
 
 }  // namespace dlod::driver
