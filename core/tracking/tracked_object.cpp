@@ -265,6 +265,11 @@ bool TrackedObject::drives() const {
            filter_.speed() > kDriving_mps && filter_.speed() > 2.0 * filter_.velocity_sd();
 }
 
+bool TrackedObject::sets_off() const {
+    return belief_.state() == DynamicState::kStatic && hits_ >= kEstablishedHits &&
+           filter_.box().size_m.head<2>().maxCoeff() > kVehicle_m && filter_.speed() > 2.0 * filter_.velocity_sd();
+}
+
 ExpectedTrack TrackedObject::expected() const {
     ExpectedTrack e;
     e.visible = visible_;

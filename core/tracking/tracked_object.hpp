@@ -54,6 +54,8 @@ class TrackedObject {
     double velocity_sd() const { return filter_.velocity_sd(); }
     /// It is as large as a vehicle, and under way.
     bool drives() const;
+    /// As large as a vehicle, it was at rest and clearly is no longer, though it does not count as dynamic yet.
+    bool sets_off() const;
     bool seen() const { return seen_now_; }  ///< in this frame
     int misses() const { return misses_; }
     int hits() const { return hits_; }

@@ -27,6 +27,7 @@ constexpr double kSimilar = 1.5;           // ratio of footprint diagonals
 constexpr double kSameVelocity_mps = 1.0;
 constexpr int kYoungHits = 10;
 constexpr double kRestSize = 1.2;         // the rest of an object is at most so many times as large as it was
+constexpr double kSameVehicle_m = 0.3;    // a vehicle's parts together are no larger than that beyond what is known
 constexpr double kStackedOverlap = 0.25;  // share of the smaller height that two halves of one object have in common
 constexpr double kStackedShift_m = 0.4;   // and between their middles in the ground plane
 constexpr double kSameFootprint = 0.4;    // parts above one another share that much of the smaller footprint
@@ -76,6 +77,15 @@ bool is_rest_of(const TrackedObject& host, const Detection& front, const Detecti
     return host.state() == DynamicState::kDynamic && host.hits() >= kYoungHits &&
            joint_size(front.box, rest.box, box.yaw_rad).maxCoeff() < kRestSize * box.size_m.head<2>().maxCoeff() &&
            rest.box.size_m.z() < kRestSize * box.size_m.z();
+}
+
+/// What rested as one vehicle sets off as one, even if its front alone stands where it was free.
+bool sets_off_with(const TrackedObject& host, const Detection& seen, const Detection& part) {
+    if (!host.sets_off()) return false;
+    const OrientedBox box = host.box();
+    const Eigen::Vector2d joint_m = joint_size(seen.box, part.box, box.yaw_rad);
+    return (joint_m.array() < box.size_m.head<2>().array() + kSameVehicle_m).all() &&
+           part.box.size_m.z() < box.size_m.z() + kSameVehicle_m;
 }
 
 /// Share of a part's footprint that lies inside of a box with a margin.
@@ -256,7 +266,8 @@ void Tracker::State::attach_parts(Frame& frame) {
             const OrientedBox& box = expected[t].whole;
             // Where a vehicle drives there is nothing else, even if it has been there itself before.
             const bool rest = detections[d].segment == detections[other].segment &&
-                              is_rest_of(host, detections[other], detections[d]);
+                              (is_rest_of(host, detections[other], detections[d]) ||
+                               sets_off_with(host, detections[other], detections[d]));
             const bool covered = host.drives() && share_inside(detections[d].box, box, 0.0) > kInsideVehicle;
             if (!rest && !covered && candidates[d].motion * expected[t].motion < -0.2) continue;
             if (height_gap_m(box, detections[d].box) > kMaxGap_m) continue;
