@@ -25,6 +25,7 @@ class ChildProcess {
     ChildProcess(const ChildProcess&) = delete;
     ChildProcess& operator=(const ChildProcess&) = delete;
 
+    pid_t pid() const { return pid_; }
     void signal(int number) const;
     /// Exit code, 128 + the number of the signal that ended it, or nothing where it still runs after the timeout.
     std::optional<int> wait(std::chrono::milliseconds timeout);

@@ -20,6 +20,7 @@ namespace dlod::test {
 using namespace std::chrono_literals;
 
 inline constexpr const char* kLiveUrl = "udpm://239.255.76.99:17667?ttl=0";
+inline constexpr std::uint16_t kLiveLcmPort = 17667;
 /// The sensor's: another dlod on the host would have the usual ones.
 inline constexpr std::uint16_t kLiveLidarPort = 17502;
 inline constexpr std::uint16_t kLiveImuPort = 17503;
