@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <utility>
 
 #include "core/tracking/association.hpp"
 #include "core/tracking/box_iou.hpp"
@@ -373,8 +373,16 @@ void Tracker::State::see_and_miss(Frame& frame) {
             t -= static_cast<int>(std::lower_bound(gone.begin(), gone.end(), static_cast<std::size_t>(t)) -
                                   gone.begin());
     }
-    for (auto t = gone.rbegin(); t != gone.rend(); ++t)
-        objects.erase(objects.begin() + static_cast<std::ptrdiff_t>(*t));
+    // Each of those that stay moves once: an object is some kilobytes.
+    std::size_t to = gone.front();
+    for (std::size_t t = to, g = 0; t < objects.size(); ++t) {
+        if (g < gone.size() && gone[g] == t) {
+            ++g;
+        } else {
+            objects[to++] = std::move(objects[t]);
+        }
+    }
+    objects.erase(objects.begin() + static_cast<std::ptrdiff_t>(to), objects.end());
 }
 
 // The largest detections first; what stands above or below one of them is the same object.
