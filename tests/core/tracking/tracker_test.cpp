@@ -170,6 +170,36 @@ TEST_F(TrackerTest, PeopleWhoWalkTogetherAndMergeEverySoOftenKeepTheirIds) {
     }
 }
 
+// Of one the feet are left by an occluder, of the other the shoulders: that does not make them one person.
+TEST_F(TrackerTest, PeopleOfWhomAnOccluderLeavesPiecesAboveOneAnotherStayTwo) {
+    Tracker tracker(sensor, config);
+    std::uint32_t left = 0, right = 0;
+    for (int k = 0; k < 40; ++k) {
+        scene.next();
+        const double x = -2.0 + 0.1 * k;
+        const bool hidden = k >= 25 && k < 30;
+        const auto a = scene.place(person(x, 5.0));
+        const auto b = scene.place(person(x + 0.05, 5.0 + (hidden ? 0.36 : 0.7)));
+        // Points are placed from the feet up.
+        scene.detect(hidden ? std::vector(a.begin(), a.begin() + 36) : a, true);
+        scene.detect(hidden ? std::vector(b.begin() + 60, b.end()) : b, true);
+        tracker.process(scene.frame);
+        const auto id_of = [&](std::size_t detection) {
+            const int track = scene.frame.detection.detections[detection].track;
+            return track < 0 ? 0U : scene.frame.detection.tracks[static_cast<std::size_t>(track)].id;
+        };
+        if (k == 20) {
+            left = id_of(0);
+            right = id_of(1);
+            ASSERT_NE(left, right);
+        }
+        if (k == 39) {
+            EXPECT_EQ(id_of(0), left);
+            EXPECT_EQ(id_of(1), right);
+        }
+    }
+}
+
 TEST_F(TrackerTest, PeopleWhoWereNeverSeenApartAreToldApartByTheGapBetweenThem) {
     Tracker tracker(sensor, config);
     std::set<std::uint32_t> ids;
