@@ -14,7 +14,7 @@ struct Beam {
     float beam_origin_m, beam_origin_height_m, beam_origin_distance_m;
 };
 
-DLOD_MULTIVERSION
+DLOD_MULTIVERSION_512
 void place_points(std::size_t count, const std::uint32_t* __restrict range_mm, const float* __restrict cos_theta,
                   const float* __restrict sin_theta, const Beam& beam, const float* __restrict T_sensor_lidar,
                   float* __restrict x, float* __restrict y, float* __restrict z, float* __restrict range_m) {

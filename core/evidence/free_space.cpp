@@ -31,9 +31,9 @@ struct CompareResults {
     float* __restrict gap;  // by how much something nearer hid the point
 };
 
-DLOD_MULTIVERSION void compare(const CompareParameters& parameters, int n, const std::int32_t* __restrict pixel,
-                               const float* __restrict range, const std::uint32_t* __restrict cells,
-                               const CompareResults& results) {
+DLOD_MULTIVERSION_512 void compare(const CompareParameters& parameters, int n, const std::int32_t* __restrict pixel,
+                                   const float* __restrict range, const std::uint32_t* __restrict cells,
+                                   const CompareResults& results) {
     const CompareParameters p = parameters;
     const CompareResults out = results;
     std::int32_t cell[kChunk];

@@ -12,7 +12,7 @@ namespace {
 constexpr double kNarrowCell_rad = 0.0062;  // one column of 1024: the window covers three
 constexpr int kWiderBits = 2;               // wide cells have so many bits more
 
-DLOD_MULTIVERSION void quantize(int n, const float* __restrict range_m, std::uint16_t* __restrict units) {
+DLOD_MULTIVERSION_512 void quantize(int n, const float* __restrict range_m, std::uint16_t* __restrict units) {
     for (int i = 0; i < n; ++i) {
         const float u = range_m[i] * (1.0F / kReferenceUnit_m);
         units[i] = static_cast<std::uint16_t>(static_cast<std::int32_t>(u < 65000.0F ? u : 0.0F));
@@ -22,9 +22,10 @@ DLOD_MULTIVERSION void quantize(int n, const float* __restrict range_m, std::uin
 // Windows hold the least of (units - 1), where a missing return wraps to the largest number, the greatest of the units,
 // and the number of missing returns.
 
-DLOD_MULTIVERSION void stack_rows(int n, const std::uint16_t* __restrict above, const std::uint16_t* __restrict here,
-                                  const std::uint16_t* __restrict below, std::uint16_t* __restrict low,
-                                  std::uint16_t* __restrict high, std::uint16_t* __restrict missing) {
+DLOD_MULTIVERSION_512 void stack_rows(int n, const std::uint16_t* __restrict above,
+                                      const std::uint16_t* __restrict here, const std::uint16_t* __restrict below,
+                                      std::uint16_t* __restrict low, std::uint16_t* __restrict high,
+                                      std::uint16_t* __restrict missing) {
     for (int i = 0; i < n; ++i) {
         const std::uint16_t a = above[i], b = here[i], c = below[i];
         const auto low_a = static_cast<std::uint16_t>(a - 1);
@@ -39,11 +40,11 @@ DLOD_MULTIVERSION void stack_rows(int n, const std::uint16_t* __restrict above, 
 }
 
 /// Joins the windows of two rows.
-DLOD_MULTIVERSION void join_rows(int n, const std::uint16_t* __restrict low_a, const std::uint16_t* __restrict low_b,
-                                 const std::uint16_t* __restrict high_a, const std::uint16_t* __restrict high_b,
-                                 const std::uint16_t* __restrict missing_a, const std::uint16_t* __restrict missing_b,
-                                 std::uint16_t* __restrict low, std::uint16_t* __restrict high,
-                                 std::uint16_t* __restrict missing) {
+DLOD_MULTIVERSION_512 void join_rows(int n, const std::uint16_t* __restrict low_a,
+                                     const std::uint16_t* __restrict low_b, const std::uint16_t* __restrict high_a,
+                                     const std::uint16_t* __restrict high_b, const std::uint16_t* __restrict missing_a,
+                                     const std::uint16_t* __restrict missing_b, std::uint16_t* __restrict low,
+                                     std::uint16_t* __restrict high, std::uint16_t* __restrict missing) {
     for (int i = 0; i < n; ++i) {
         low[i] = low_a[i] < low_b[i] ? low_a[i] : low_b[i];
         high[i] = high_a[i] > high_b[i] ? high_a[i] : high_b[i];
@@ -52,9 +53,9 @@ DLOD_MULTIVERSION void join_rows(int n, const std::uint16_t* __restrict low_a, c
 }
 
 /// Joins each two neighbours: n windows from 2 n.
-DLOD_MULTIVERSION void halve(int n, const std::uint16_t* __restrict low_in, const std::uint16_t* __restrict high_in,
-                             const std::uint16_t* __restrict missing_in, std::uint16_t* __restrict low,
-                             std::uint16_t* __restrict high, std::uint16_t* __restrict missing) {
+DLOD_MULTIVERSION_512 void halve(int n, const std::uint16_t* __restrict low_in, const std::uint16_t* __restrict high_in,
+                                 const std::uint16_t* __restrict missing_in, std::uint16_t* __restrict low,
+                                 std::uint16_t* __restrict high, std::uint16_t* __restrict missing) {
     for (int i = 0; i < n; ++i) {
         low[i] = low_in[2 * i] < low_in[2 * i + 1] ? low_in[2 * i] : low_in[2 * i + 1];
         high[i] = high_in[2 * i] > high_in[2 * i + 1] ? high_in[2 * i] : high_in[2 * i + 1];
@@ -76,9 +77,9 @@ inline std::uint32_t pack(std::uint16_t low, std::uint16_t high, int missing, in
 }
 
 /// Cells of one column: their windows are three wide.
-DLOD_MULTIVERSION void pack_columns(int n, int most_missing, const std::uint16_t* __restrict low,
-                                    const std::uint16_t* __restrict high, const std::uint16_t* __restrict missing,
-                                    std::uint32_t* __restrict cells) {
+DLOD_MULTIVERSION_512 void pack_columns(int n, int most_missing, const std::uint16_t* __restrict low,
+                                        const std::uint16_t* __restrict high, const std::uint16_t* __restrict missing,
+                                        std::uint32_t* __restrict cells) {
     for (int i = 0; i < n; ++i) {
         cells[i] =
             pack(lesser(lesser(low[i - 1], low[i]), low[i + 1]), greater(greater(high[i - 1], high[i]), high[i + 1]),
@@ -87,9 +88,9 @@ DLOD_MULTIVERSION void pack_columns(int n, int most_missing, const std::uint16_t
 }
 
 /// Cells of two units: their windows are four wide.
-DLOD_MULTIVERSION void pack_pairs(int n, int most_missing, const std::uint16_t* __restrict low,
-                                  const std::uint16_t* __restrict high, const std::uint16_t* __restrict missing,
-                                  std::uint32_t* __restrict cells) {
+DLOD_MULTIVERSION_512 void pack_pairs(int n, int most_missing, const std::uint16_t* __restrict low,
+                                      const std::uint16_t* __restrict high, const std::uint16_t* __restrict missing,
+                                      std::uint32_t* __restrict cells) {
     for (int i = 0; i < n; ++i) {
         const int k = 2 * i;
         cells[i] = pack(lesser(lesser(low[k - 1], low[k]), lesser(low[k + 1], low[k + 2])),

@@ -25,9 +25,9 @@ constexpr int kChunk = 256;  // points between the steps of a batch: small enoug
 
 /// Step 1: range, table entry of the elevation, column of the azimuth and inverse distance. No look-ups, so that it
 /// vectorises.
-DLOD_MULTIVERSION void locate(const BatchParameters& parameters, int n, const float* __restrict x,
-                              const float* __restrict y, const float* __restrict z, std::int32_t* __restrict entry,
-                              float* __restrict column, float* __restrict inverse_m, float* __restrict range) {
+DLOD_MULTIVERSION_512 void locate(const BatchParameters& parameters, int n, const float* __restrict x,
+                                  const float* __restrict y, const float* __restrict z, std::int32_t* __restrict entry,
+                                  float* __restrict column, float* __restrict inverse_m, float* __restrict range) {
     const BatchParameters p = parameters;
     constexpr auto kLastEntry = static_cast<float>(kTableSize - 1);
     for (int i = 0; i < n; ++i) {
@@ -65,16 +65,17 @@ DLOD_MULTIVERSION void locate(const BatchParameters& parameters, int n, const fl
 }
 
 /// Step 2: rows from the table.
-DLOD_MULTIVERSION void look_up_rows(int n, const std::int32_t* __restrict entry,
-                                    const std::int32_t* __restrict row_of_tangent, std::int32_t* __restrict row) {
+DLOD_MULTIVERSION_512 void look_up_rows(int n, const std::int32_t* __restrict entry,
+                                        const std::int32_t* __restrict row_of_tangent, std::int32_t* __restrict row) {
     for (int i = 0; i < n; ++i) row[i] = row_of_tangent[entry[i]];
 }
 
 /// Step 3: the rows' own column offsets. The tables begin with an entry for row -1.
-DLOD_MULTIVERSION void finish_columns(int width, int n, const std::int32_t* __restrict row,
-                                      const float* __restrict column, const float* __restrict inverse_m,
-                                      const float* __restrict column_zero, const float* __restrict column_per_inverse_m,
-                                      const float* __restrict column_shift, std::int32_t* __restrict pixel) {
+DLOD_MULTIVERSION_512 void finish_columns(int width, int n, const std::int32_t* __restrict row,
+                                          const float* __restrict column, const float* __restrict inverse_m,
+                                          const float* __restrict column_zero,
+                                          const float* __restrict column_per_inverse_m,
+                                          const float* __restrict column_shift, std::int32_t* __restrict pixel) {
     const auto turn = static_cast<float>(width);
     for (int i = 0; i < n; ++i) {
         float c = column[i] + column_zero[row[i] + 1] + column_shift[row[i] + 1] +

@@ -14,16 +14,17 @@ constexpr auto kUndecided = static_cast<std::uint8_t>(PixelLabel::kUndecided);
 constexpr auto kGround = static_cast<std::uint8_t>(PixelLabel::kGround);
 
 /// Labels before any object: nothing, ground or static.
-DLOD_MULTIVERSION void label_background(const std::uint32_t* __restrict range, const std::uint8_t* __restrict ground,
-                                        std::size_t size, std::uint8_t* __restrict label) {
+DLOD_MULTIVERSION_512 void label_background(const std::uint32_t* __restrict range,
+                                            const std::uint8_t* __restrict ground, std::size_t size,
+                                            std::uint8_t* __restrict label) {
     for (std::size_t i = 0; i < size; ++i) {
         const std::uint8_t surface = ground[i] != 0 ? kGround : kStatic;
         label[i] = range[i] != 0 ? surface : kNoReturn;
     }
 }
 
-DLOD_MULTIVERSION void label_background_without_ground(const std::uint32_t* __restrict range, std::size_t size,
-                                                       std::uint8_t* __restrict label) {
+DLOD_MULTIVERSION_512 void label_background_without_ground(const std::uint32_t* __restrict range, std::size_t size,
+                                                           std::uint8_t* __restrict label) {
     for (std::size_t i = 0; i < size; ++i) label[i] = range[i] != 0 ? kStatic : kNoReturn;
 }
 

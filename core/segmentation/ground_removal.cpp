@@ -29,9 +29,9 @@ constexpr float kUpGain = 0.5F;
 constexpr float kNoiseShare = 0.3F;
 
 /// Distance and height of one row of points with respect to the vertical (ux, uy, uz).
-DLOD_MULTIVERSION void cylindrical_row(int width, const float* __restrict x, const float* __restrict y,
-                                       const float* __restrict z, float ux, float uy, float uz, float min_range,
-                                       float* __restrict distance, float* __restrict height) {
+DLOD_MULTIVERSION_512 void cylindrical_row(int width, const float* __restrict x, const float* __restrict y,
+                                           const float* __restrict z, float ux, float uy, float uz, float min_range,
+                                           float* __restrict distance, float* __restrict height) {
     const float min_squared = min_range * min_range;
     for (int c = 0; c < width; ++c) {
         const float h = ux * x[c] + uy * y[c] + uz * z[c];
@@ -52,11 +52,12 @@ struct LineFilterParameters {
 
 /// One row of all columns' line filters; `above` is kRowsAbove rows up, `wall_rise` what a wall rises to there per
 /// metre of distance.
-DLOD_MULTIVERSION void follow_ground_row(int width, const float* __restrict distance, const float* __restrict height,
-                                         const float* __restrict distance_above, const float* __restrict height_above,
-                                         LineFilterParameters p, float wall_rise, float* __restrict line_distance,
-                                         float* __restrict line_height, float* __restrict line_slope,
-                                         float* __restrict line_started, std::uint8_t* __restrict ground) {
+DLOD_MULTIVERSION_512 void follow_ground_row(int width, const float* __restrict distance,
+                                             const float* __restrict height, const float* __restrict distance_above,
+                                             const float* __restrict height_above, LineFilterParameters p,
+                                             float wall_rise, float* __restrict line_distance,
+                                             float* __restrict line_height, float* __restrict line_slope,
+                                             float* __restrict line_started, std::uint8_t* __restrict ground) {
     for (int c = 0; c < width; ++c) {
         const float base = distance[c] - line_distance[c];
         const float predicted = line_height[c] + line_slope[c] * base;

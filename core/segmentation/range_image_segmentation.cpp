@@ -14,8 +14,8 @@ namespace {
 constexpr std::size_t kWord = 64;
 constexpr std::size_t kBoundsStep = 4;
 
-DLOD_MULTIVERSION void select_row(int width, const float* __restrict range, const std::uint8_t* __restrict ground,
-                                  float min_range, float max_range, float* __restrict selected) {
+DLOD_MULTIVERSION_512 void select_row(int width, const float* __restrict range, const std::uint8_t* __restrict ground,
+                                      float min_range, float max_range, float* __restrict selected) {
     for (int c = 0; c < width; ++c) {
         const bool use = (ground[c] == 0) & (range[c] >= min_range) & (range[c] <= max_range);
         selected[c] = use ? range[c] : 0.0F;

@@ -29,9 +29,9 @@ inline bool is_linked(float near, float far, float ratio, float max_step) {
 }
 
 /// One row of ranges with a border of one at its end. (GCC vectorises the loop only with near and far taken here.)
-DLOD_MULTIVERSION void link_row(int width, const float* __restrict ranges, const float* __restrict ranges_above,
-                                float ratio_right, float ratio_down, float max_step, std::uint8_t* __restrict used,
-                                std::uint8_t* __restrict to_right, std::uint8_t* __restrict to_above) {
+DLOD_MULTIVERSION_512 void link_row(int width, const float* __restrict ranges, const float* __restrict ranges_above,
+                                    float ratio_right, float ratio_down, float max_step, std::uint8_t* __restrict used,
+                                    std::uint8_t* __restrict to_right, std::uint8_t* __restrict to_above) {
     for (int c = 0; c < width; ++c) {
         const float here = ranges[c];
         const float right = ranges[c + 1];
