@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <numbers>
 
 #include "core/types/multiversion.hpp"
@@ -84,6 +83,31 @@ DLOD_MULTIVERSION void find_hidden(const CompareParameters& parameters, int n, c
     }
 }
 
+/// Lists the marked ones of n points. @return how many there are
+std::size_t list_marked(std::size_t n, const std::uint8_t* __restrict marks, std::int32_t* __restrict list) {
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+        list[count] = static_cast<std::int32_t>(i);
+        count += marks[i];
+    }
+    return count;
+}
+
+/// Where something by `gap` nearer stood before the listed points, seen from the origin.
+DLOD_MULTIVERSION void place_hiders(std::size_t n, const std::int32_t* __restrict list, const float* __restrict gap,
+                                    const float* __restrict range, const float* __restrict x, const float* __restrict y,
+                                    const float* __restrict z, const Eigen::Vector3f& origin, float* __restrict hider_x,
+                                    float* __restrict hider_y, float* __restrict hider_z) {
+    const float ox = origin.x(), oy = origin.y(), oz = origin.z();
+    for (std::size_t h = 0; h < n; ++h) {
+        const std::int32_t i = list[h];
+        const float share = 1.0F - gap[i] / range[i];
+        hider_x[h] = ox + share * (x[i] - ox);
+        hider_y[h] = oy + share * (y[i] - oy);
+        hider_z[h] = oz + share * (z[i] - oz);
+    }
+}
+
 }  // namespace
 
 FreeSpace::FreeSpace(const SensorModel& sensor, const FreeSpaceConfig& config, int narrow_bits, int wide_bits)
@@ -109,7 +133,7 @@ FreeSpace::FreeSpace(const SensorModel& sensor, const FreeSpaceConfig& config, i
     for (auto* v : {&range_, &gap_, &hider_x_, &hider_y_, &hider_z_, &hider_range_}) v->assign(sensor.pixels(), 0.0F);
     hider_pixel_.assign(sensor.pixels(), 0);
     hidden_.assign(sensor.pixels(), 0);
-    behind_.reserve(sensor.pixels());
+    behind_.assign(sensor.pixels(), 0);
 }
 
 /// The block that looks at a point, by its azimuth alone.
@@ -129,27 +153,16 @@ void FreeSpace::follow_receding(const Comparison& comparison, const Eigen::Isome
     const auto margin_at = [this](float range) {
         return static_cast<float>(config_.margin_m) + static_cast<float>(config_.margin_per_m) * range;
     };
-    behind_.clear();
-    const Eigen::Vector3f origin = T_column_sensor.inverse().translation();
-    const auto size = static_cast<std::size_t>(n);
-    for (std::size_t k = 0; k < size; ++k) {
-        const void* next = std::memchr(&hidden_[k], 1, size - k);
-        if (next == nullptr) break;
-        k = static_cast<std::size_t>(static_cast<const std::uint8_t*>(next) - hidden_.data());
-        const std::size_t i = static_cast<std::size_t>(begin) + k;
-        const float share = 1.0F - gap_[k] / range_[k];
-        const std::size_t h = behind_.size();
-        hider_x_[h] = origin.x() + share * (points.x[i] - origin.x());
-        hider_y_[h] = origin.y() + share * (points.y[i] - origin.y());
-        hider_z_[h] = origin.z() + share * (points.z[i] - origin.z());
-        behind_.push_back(static_cast<std::int32_t>(k));
-    }
-    if (behind_.empty()) return;
+    const std::size_t behind = list_marked(static_cast<std::size_t>(n), hidden_.data(), behind_.data());
+    if (behind == 0) return;
+    place_hiders(behind, behind_.data(), gap_.data(), range_.data(), points.x.data() + begin, points.y.data() + begin,
+                 points.z.data() + begin, T_column_sensor.inverse().translation(), hider_x_.data(), hider_y_.data(),
+                 hider_z_.data());
     const Reference& now = comparison.now;
     const std::size_t block = block_of({hider_x_[0], hider_y_[0], hider_z_[0]});
-    projection_.project(now.T_block_stamp[block], static_cast<int>(behind_.size()), hider_x_.data(), hider_y_.data(),
+    projection_.project(now.T_block_stamp[block], static_cast<int>(behind), hider_x_.data(), hider_y_.data(),
                         hider_z_.data(), now.column_shift.data(), hider_pixel_.data(), hider_range_.data());
-    for (std::size_t h = 0; h < behind_.size(); ++h) {
+    for (std::size_t h = 0; h < behind; ++h) {
         const auto k = static_cast<std::size_t>(behind_[h]);
         const std::size_t i = static_cast<std::size_t>(begin) + k;
         const float margin = margin_at(range_[k]);

@@ -94,7 +94,7 @@ class FreeSpace {
     AlignedVector<float> range_;
     AlignedVector<float> gap_;            ///< by how much something nearer hid each point
     AlignedVector<std::uint8_t> hidden_;  ///< 1: something did
-    std::vector<std::int32_t> behind_;    ///< the block's points of which it did
+    std::vector<std::int32_t> behind_;    ///< first those of the block's points of which it did
     AlignedVector<float> hider_x_, hider_y_, hider_z_, hider_range_;
     AlignedVector<std::int32_t> hider_pixel_;
 };
