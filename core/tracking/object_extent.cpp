@@ -11,9 +11,10 @@ constexpr double kNotSeen = 10.0;  // standard deviation of what was not measure
 constexpr double kOblique = 0.35;  // sine of 20 degrees: a side seen flatter than that hides nothing
 constexpr double kLimb = 0.25;     // of the difference to the remembered size
 constexpr double kCarWidth_m = 1.8;
-constexpr double kWidest_m = 3.2;  // vehicles
-constexpr double kLimbs_m = 2.0;   // what is smaller may have limbs: a low or narrow piece of it may be one
-constexpr double kMostOfIt = 0.5;  // of its height must be seen for its ends to be seen
+constexpr double kWidest_m = 3.2;    // vehicles
+constexpr double kLimbs_m = 2.0;     // what is smaller may have limbs: a low or narrow piece of it may be one
+constexpr double kMostOfIt = 0.5;    // of its height must be seen for its ends to be seen
+constexpr double kPieceNoise = 0.8;  // of what it may be off by: an even distribution has 0.58
 constexpr double kLongest_m = 25.0;
 constexpr double kVehicleLength_m = 4.0;   // of the smaller cars
 constexpr double kVehicleWidth_m = 1.4;    // what is as wide as that
@@ -52,8 +53,9 @@ double longest_side(double side_m, double other_side_m) {
 
 /// @param center_m of the visible side, from the remembered centre
 /// @param most_m it is no longer than that
+/// @param piece of something with limbs: it may be one of them
 CompletedSide complete_side(double center_m, double visible_m, double before_m, double remembered_m, double most_m,
-                            HiddenEnds hidden, const KalmanConfig& config) {
+                            HiddenEnds hidden, bool piece, const KalmanConfig& config) {
     CompletedSide side{center_m, visible_m, config.position_sd_m, config.size_sd_m, 0.0, 0.0};
     if (!hidden.low && !hidden.high) {
         // A limb that is stretched out for a moment is not the object's size: seen ends move it by a little.
@@ -64,7 +66,12 @@ CompletedSide complete_side(double center_m, double visible_m, double before_m, 
     side.size_m = remembered_m + growth;
     side.size_sd_m = kNotSeen;
     const double missing = side.size_m - visible_m;
-    if (hidden.low && hidden.high) {
+    if (hidden.low && hidden.high && piece && growth <= 0.0) {
+        // It lies somewhere inside, the middle as likely as where it was expected: half of the way.
+        const double slack = 0.5 * std::max(0.0, missing);
+        side.center_m += 0.5 * std::clamp(-center_m, -slack, slack);
+        side.position_sd_m += kPieceNoise * slack;
+    } else if (hidden.low && hidden.high) {
         // The visible part lies somewhere inside.
         const double slack = 0.5 * std::max(0.0, missing);
         const double toward = growth > 0.0 ? 0.0 : std::clamp(-center_m, -slack, slack);
@@ -96,10 +103,10 @@ ExtentMeasurement complete_extent(const OrientedBox& visible, const Eigen::Vecto
     };
     const CompletedSide length =
         complete_side(along.dot(offset), visible.size_m.x(), before_m.x(), remembered.size_m.x(),
-                      longest_side(remembered.size_m.x(), remembered.size_m.y()), ends(along), config);
+                      longest_side(remembered.size_m.x(), remembered.size_m.y()), ends(along), piece, config);
     const CompletedSide width =
         complete_side(across.dot(offset), visible.size_m.y(), before_m.y(), remembered.size_m.y(),
-                      longest_side(remembered.size_m.y(), remembered.size_m.x()), ends(across), config);
+                      longest_side(remembered.size_m.y(), remembered.size_m.x()), ends(across), piece, config);
     ExtentMeasurement out;
     out.growth = {length.growth_high_m, length.growth_low_m, width.growth_high_m, width.growth_low_m};
     BoxMeasurement& m = out.box;

@@ -19,6 +19,9 @@ constexpr double kVague_m = 0.3;           // and none that is less sure: half o
 constexpr double kHeadingSpeed_mps = 0.7;  // slower objects may move sideways
 constexpr double kElongated = 1.6;         // a principal axis says where an object points
 constexpr double kDoubt_m = 0.5;           // in the size of what may have been two
+constexpr double kBody_m = 1.0;            // people and the like seem no larger
+constexpr double kRunning_mps = 3.0;       // what is faster may be a vehicle of which little is seen
+constexpr double kTwoBodies_m = 1.5;       // and are none if they were that long
 constexpr double kCutSize_m = 2.0;         // noise of the size of what was cut out by its own box
 constexpr double kVehicle_m = 2.5;         // vehicles are longer than people and cyclists
 constexpr double kDriving_mps = 1.0;
@@ -180,11 +183,22 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
     if (belief_.update(cues, config.state)) {
         history_.release(cleared);
         cleared.push_back(filter_.box());
+        leave_background(sighting.visibility);
     } else if (belief_.state() != DynamicState::kDynamic) {
         OrientedBox world = visible_;
         world.center_m += filter_.box().center_m;
         history_.add(world);
     }
+}
+
+void TrackedObject::leave_background(const Visibility& visibility) {
+    OrientedBox part = visible_;
+    part.center_m += filter_.box().center_m;
+    const double longest_m = part.size_m.head<2>().maxCoeff();
+    const bool body = longest_m < kBody_m && longest_m < part.size_m.z() && filter_.speed() < kRunning_mps;
+    if (!body || filter_.box().size_m.head<2>().maxCoeff() < kTwoBodies_m) return;
+    const Growth other = surplus(filter_.box(), assumed_box(part, visibility));
+    filter_.grow(other.front, other.back, other.left, other.right);
 }
 
 void TrackedObject::miss(Sight sight) {

@@ -65,6 +65,8 @@ class TrackedObject {
     std::pair<double, double> measured_yaw(const PointSpan& points);
     /// Of what moves, more is there than one side shows.
     void assume_extent(const Visibility& visibility);
+    /// What is no larger than a person when it begins to move was taken together with what it stood at.
+    void leave_background(const Visibility& visibility);
     bool clear_without_displacement(const MotionCues& cues) const;
     /// Registers this frame's points to earlier ones, and renews those.
     /// @param age_s of the points before the stamp
