@@ -11,13 +11,16 @@ constexpr float kThinStepPerMetre = 0.02F;
 // A requested pixel counts as unknown until run() has tested it.
 constexpr auto kRequested = static_cast<std::uint8_t>(Evidence::kUnknown);
 
-/// Free where some reference is sure of it and not many more object, or where what stands there has come from nearer;
-/// occupied where they object for long enough.
+/// Free where some reference is sure of it and not many more object, or where what stands there has come from nearer,
+/// for more references where it came by less than two surfaces can be told apart; occupied where they object for long
+/// enough.
 Evidence judge(const CandidatePoints& points, std::size_t i) {
-    if (points.free[i] >= 1.0F && points.occupied[i] <= points.free[i] + 1.0F) return Evidence::kFree;
-    if (points.occupied[i] >= 1.0F) return Evidence::kOccupied;
-    const bool receded = points.gone[i] >= 2.0F && points.slowest[i] <= points.fastest[i];
-    return receded ? Evidence::kFree : Evidence::kUnknown;
+    const float enough = points.occupied[i] >= 1.0F ? 3.0F : 2.0F;
+    const bool receded = points.gone[i] >= enough && points.slowest[i] <= points.fastest[i];
+    if (receded || (points.free[i] >= 1.0F && points.occupied[i] <= points.free[i] + 1.0F)) return Evidence::kFree;
+    // What has gone by less than surfaces can be told apart need not be what was there; leaves seem to come, too.
+    const bool shifted = points.gone[i] >= 2.0F && points.came[i] == 0.0F;
+    return points.occupied[i] >= 1.0F && !shifted ? Evidence::kOccupied : Evidence::kUnknown;
 }
 
 /// A return that no neighbour above or below, or none to both sides, is near to: a plate or wire thinner than the beams

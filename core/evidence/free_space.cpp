@@ -20,6 +20,7 @@ struct CompareParameters {
     int narrow_bits, wide_bits;
     std::int32_t wide_begin;
     float occupied_weight;
+    float receding_margin, receding_margin_per_m;
     float per_age;  // 1/s
 };
 
@@ -27,7 +28,8 @@ struct CompareParameters {
 struct CompareResults {
     float* __restrict free;  // sums
     float* __restrict occupied;
-    float* __restrict gap;  // by how much something nearer hid the point
+    float* __restrict gap;    // by how much something nearer hid the point,
+    float* __restrict cover;  // and the farthest that was seen there
 };
 
 DLOD_MULTIVERSION_512 void compare(const CompareParameters& parameters, int n, const std::int32_t* __restrict pixel,
@@ -58,28 +60,32 @@ DLOD_MULTIVERSION_512 void compare(const CompareParameters& parameters, int n, c
             out.free[begin + i] += is_free ? 1.0F : 0.0F;
             out.occupied[begin + i] += is_occupied ? p.occupied_weight : 0.0F;
             out.gap[begin + i] = known ? gap : kUnknownGap;
+            out.cover[begin + i] = known ? r - farthest : kUnknownGap;
         }
     }
 }
 
 /// Finds the points that something hid and that may have moved away from there, and bounds the speed of the others.
 DLOD_MULTIVERSION void find_hidden(const CompareParameters& parameters, int n, const float* __restrict range,
-                                   const float* __restrict gaps, float* __restrict fastest_bound,
+                                   const float* __restrict gaps, const float* __restrict covers,
+                                   float* __restrict fastest_bound, float* __restrict came,
                                    std::uint8_t* __restrict hidden) {
     const CompareParameters p = parameters;
     for (int i = 0; i < n; ++i) {
         const float gap = gaps[i];
-        const float margin = p.margin + p.margin_per_m * range[i];
+        const float cover = covers[i];
+        const float margin = p.receding_margin + p.receding_margin_per_m * range[i];
         const float bound = fastest_bound[i];
         // Where something far nearer was seen, that went by; where it was seen at the same place, or almost so, it can
         // only have come slowly.
-        const float slowest = ((1.0F - kUneven) * gap - margin) * p.per_age;
+        const float slowest = ((1.0F - kUneven) * cover - margin) * p.per_age;
         const float fastest = (gap + kUneven * std::abs(gap) + margin) * p.per_age;
         const float of_hidden = slowest > bound ? 0.0F : bound;
         const float of_seen = fastest < bound ? fastest : bound;
         const float of_rest = gap >= -margin ? of_seen : bound;
-        fastest_bound[i] = gap > margin ? of_hidden : of_rest;
-        hidden[i] = (gap > margin) & (slowest <= bound) & (bound > 0.0F) ? 1 : 0;
+        came[i] += (gap < -margin) & (gap > kUnknownGap) ? 1.0F : 0.0F;
+        fastest_bound[i] = cover > margin ? of_hidden : of_rest;
+        hidden[i] = (cover > margin) & (slowest <= bound) & (bound > 0.0F) ? 1 : 0;
     }
 }
 
@@ -130,7 +136,8 @@ FreeSpace::FreeSpace(const SensorModel& sensor, const FreeSpaceConfig& config, i
     }
     mean_offset_rad_ = static_cast<float>(columns / std::max(1, sensor.height) * column_rad);
     pixel_.assign(sensor.pixels(), 0);
-    for (auto* v : {&range_, &gap_, &hider_x_, &hider_y_, &hider_z_, &hider_range_}) v->assign(sensor.pixels(), 0.0F);
+    for (auto* v : {&range_, &gap_, &cover_, &hider_x_, &hider_y_, &hider_z_, &hider_range_})
+        v->assign(sensor.pixels(), 0.0F);
     hider_pixel_.assign(sensor.pixels(), 0);
     hidden_.assign(sensor.pixels(), 0);
     behind_.assign(sensor.pixels(), 0);
@@ -151,7 +158,8 @@ std::size_t FreeSpace::block_of(const Eigen::Vector3f& point) const {
 void FreeSpace::follow_receding(const Comparison& comparison, const Eigen::Isometry3f& T_column_sensor, int begin,
                                 int n, CandidatePoints& points) {
     const auto margin_at = [this](float range) {
-        return static_cast<float>(config_.margin_m) + static_cast<float>(config_.margin_per_m) * range;
+        return static_cast<float>(config_.receding_margin_m) +
+               static_cast<float>(config_.receding_margin_per_m) * range;
     };
     const std::size_t behind = list_marked(static_cast<std::size_t>(n), hidden_.data(), behind_.data());
     if (behind == 0) return;
@@ -170,20 +178,10 @@ void FreeSpace::follow_receding(const Comparison& comparison, const Eigen::Isome
             hider_pixel_[h] < 0 ? 0U : now.cells[static_cast<std::size_t>(hider_pixel_[h]) >> narrow_bits_];
         if (static_cast<float>(seen & 0xFFFFU) * kReferenceUnit_m > hider_range_[h] + margin_at(hider_range_[h])) {
             points.gone[i] += 1.0F;
-            points.slowest[i] = std::max(points.slowest[i], ((1.0F - kUneven) * gap_[k] - margin) / comparison.age_s);
+            points.slowest[i] = std::max(points.slowest[i], ((1.0F - kUneven) * cover_[k] - margin) / comparison.age_s);
             points.fastest[i] = std::min(points.fastest[i], ((1.0F + kUneven) * gap_[k] + margin) / comparison.age_s);
-            continue;
         }
-        // Still there, where all that was seen in that direction was nearer: an edge.
-        const std::uint32_t hid = comparison.reference.cells[cell_of(pixel_[k], range_[k])];
-        if (static_cast<float>(hid >> 16U) * kReferenceUnit_m < range_[k] - margin) points.fastest[i] = 0.0F;
     }
-}
-
-std::size_t FreeSpace::cell_of(std::int32_t pixel, float range) const {
-    const auto p = static_cast<std::size_t>(pixel);
-    return range < static_cast<float>(config_.near_m) ? (late_.size() >> narrow_bits_) + (p >> wide_bits_)
-                                                      : p >> narrow_bits_;
 }
 
 void FreeSpace::compare_block(const Comparison& comparison, const Eigen::Isometry3f& T_column_sensor, int begin, int n,
@@ -196,11 +194,15 @@ void FreeSpace::compare_block(const Comparison& comparison, const Eigen::Isometr
                                        wide_bits_,
                                        static_cast<std::int32_t>(late_.size() >> narrow_bits_),
                                        comparison.occupied_weight,
+                                       static_cast<float>(config_.receding_margin_m),
+                                       static_cast<float>(config_.receding_margin_per_m),
                                        1.0F / comparison.age_s};
-    const CompareResults results{points.free.data() + begin, points.occupied.data() + begin, gap_.data()};
+    const CompareResults results{points.free.data() + begin, points.occupied.data() + begin, gap_.data(),
+                                 cover_.data()};
     compare(parameters, n, pixel_.data(), range_.data(), comparison.reference.cells.data(), results);
     if (!comparison.recent) return;
-    find_hidden(parameters, n, range_.data(), gap_.data(), points.fastest.data() + begin, hidden_.data());
+    find_hidden(parameters, n, range_.data(), gap_.data(), cover_.data(), points.fastest.data() + begin,
+                points.came.data() + begin, hidden_.data());
     follow_receding(comparison, T_column_sensor, begin, n, points);
 }
 
@@ -238,7 +240,7 @@ void FreeSpace::test_block(const Comparison& comparison, int begin, int n, Candi
 
 void FreeSpace::test(const Frame& frame, std::span<const Reference* const> references, const Reference& now,
                      CandidatePoints& points) {
-    for (auto* v : {&points.free, &points.occupied, &points.gone}) v->assign(points.size(), 0.0F);
+    for (auto* v : {&points.free, &points.occupied, &points.gone, &points.came}) v->assign(points.size(), 0.0F);
     points.slowest.assign(points.size(), static_cast<float>(config_.min_receding_mps));
     points.fastest.assign(points.size(), kFastest_mps);
     for (const Reference* const reference : references) {

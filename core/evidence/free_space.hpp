@@ -18,14 +18,17 @@ struct FreeSpaceConfig {
     int octaves = 6;
     double settle_s = 0.8;
     double receding_s = 1.0;
-    double min_receding_mps = 0.3;
+    double receding_margin_m = 0.03;
+    double receding_margin_per_m = 0.01;
+    double min_receding_mps = 0.15;
 
     template <class V>
     void visit(V& v) {
         v.parameter("margin_m", margin_m, Range{0.01, 2.0}, "m",
                     "an earlier frame must have seen so much farther than a point for its place to count as free; "
                     "higher is safer, slower");
-        v.parameter("margin_per_m", margin_per_m, Range{0.0, 0.2}, "1", "growth of that margin with range");
+        v.parameter("margin_per_m", margin_per_m, Range{0.0, 0.2}, "1",
+                    "growth of that margin with range, as of the width that a direction is known to");
         v.parameter("occupied_tolerance_m", occupied_tolerance_m, Range{0.01, 1.0}, "m",
                     "an earlier return within this (plus margin_per_m) of a point makes its place occupied");
         v.parameter("near_m", near_m, Range{0.0, 50.0}, "m",
@@ -36,6 +39,11 @@ struct FreeSpaceConfig {
                     "a frame so old that saw a place occupied counts fully against motion, younger ones less");
         v.parameter("receding_s", receding_s, Range{0.0, 10.0}, "s",
                     "what moves away from the sensor is looked for in so many last seconds; 0: not at all");
+        v.parameter("receding_margin_m", receding_margin_m, Range{0.01, 2.0}, "m",
+                    "all that was seen in a direction must have been so much nearer to count as moved away; higher is "
+                    "safer, slower");
+        v.parameter("receding_margin_per_m", receding_margin_per_m, Range{0.0, 0.2}, "1",
+                    "growth of that margin with range, as of the width that a direction is known to");
         v.parameter("min_receding_mps", min_receding_mps, Range{0.01, 10.0}, "m/s", "slower is not told from rest");
     }
 };
@@ -47,6 +55,7 @@ struct CandidatePoints {
     AlignedVector<float> free, occupied;  ///< results: for how many references the place was free, and was occupied;
                                           ///< the latter weighted by age, since what moves slowly was here just before
     AlignedVector<float> gone;            ///< results: in how many references something hid the place that is gone now
+    AlignedVector<float> came;            ///< results: how many recent references saw only farther surfaces there
     AlignedVector<float> slowest, fastest;  ///< speeds at which that can have moved away to here; none: it did not
     std::vector<std::uint32_t> block_end;   ///< [Reference::kBlocks] end of each block's points
     std::size_t size() const { return pixel.size(); }
@@ -79,7 +88,6 @@ class FreeSpace {
                        CandidatePoints& points);
     void follow_receding(const Comparison& comparison, const Eigen::Isometry3f& T_column_sensor, int begin, int n,
                          CandidatePoints& points);
-    std::size_t cell_of(std::int32_t pixel, float range) const;
     std::size_t block_of(const Eigen::Vector3f& point) const;
 
     FreeSpaceConfig config_;
@@ -93,6 +101,7 @@ class FreeSpace {
     AlignedVector<std::int32_t> pixel_;  ///< scratch of one block
     AlignedVector<float> range_;
     AlignedVector<float> gap_;            ///< by how much something nearer hid each point
+    AlignedVector<float> cover_;          ///< by how much all that was seen there did
     AlignedVector<std::uint8_t> hidden_;  ///< 1: something did
     std::vector<std::int32_t> behind_;    ///< first those of the block's points of which it did
     AlignedVector<float> hider_x_, hider_y_, hider_z_, hider_range_;

@@ -10,6 +10,17 @@ namespace {
 
 constexpr int kMaxWindow = 24;  // pixels to each side that are tested around a free one
 
+/// Longest extent in the ground plane, along two axes of the sensor.
+double breadth_m(const OdometryResult& odometry, std::span<const PixelIndex> pixels) {
+    Eigen::Array2f low = Eigen::Array2f::Constant(1e9F), high = -low;
+    for (const PixelIndex p : pixels) {
+        const Eigen::Array2f q(odometry.x[p], odometry.y[p]);
+        low = low.min(q);
+        high = high.max(q);
+    }
+    return static_cast<double>((high - low).maxCoeff());
+}
+
 }  // namespace
 
 MovingParts::MovingParts(const SensorModel& sensor, const MovingPartsConfig& config)
@@ -75,12 +86,12 @@ bool MovingParts::grow(const Frame& frame, const Segment& segment, const Evidenc
             away_m_.push_back(away);
         }
     }
-    const double min_height = segment.count > static_cast<std::uint32_t>(config_.small_segment)
-                                  ? config_.min_carved_height_m
-                                  : config_.min_height_m;
+    const bool carved = segment.count > static_cast<std::uint32_t>(config_.small_segment);
+    const double min_height = carved ? config_.min_carved_height_m : config_.min_height_m;
     const auto [low, high] = std::minmax_element(
         part_.begin(), part_.end(), [&](PixelIndex a, PixelIndex b) { return odometry.z[a] < odometry.z[b]; });
     if (static_cast<double>(odometry.z[*high] - odometry.z[*low]) < min_height) return false;
+    if (carved && breadth_m(odometry, part_) < config_.min_carved_breadth_m) return false;
     return part_.size() >= static_cast<std::size_t>(config_.min_points) &&
            static_cast<double>(free) >= config_.min_free_share * static_cast<double>(part_.size());
 }

@@ -15,6 +15,7 @@ struct MovingPartsConfig {
     int min_points = 6;
     double min_height_m = 0.15;
     double min_carved_height_m = 0.4;
+    double min_carved_breadth_m = 0.25;
     int small_segment = 80;
     double min_free_share = 0.3;
 
@@ -27,6 +28,8 @@ struct MovingPartsConfig {
                     "flatter parts are noise: thin plates lie between the beams in some frames");
         v.parameter("min_carved_height_m", min_carved_height_m, Range{0.0, 2.0}, "m",
                     "likewise of parts of larger segments: what moves there is at least so tall");
+        v.parameter("min_carved_breadth_m", min_carved_breadth_m, Range{0.0, 2.0}, "m",
+                    "narrower parts of larger segments are the inner sides of edges that come into view");
         v.parameter("small_segment", small_segment, Range{1, 10000}, "pixels",
                     "segments of more pixels are larger ones");
         v.parameter("min_free_share", min_free_share, Range{0.0, 1.0}, "1",

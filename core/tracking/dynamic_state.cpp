@@ -22,6 +22,8 @@ constexpr double kAway_m = 0.15;      // from the mean place of rest
 constexpr double kRestMean = 0.1;     // weight of a new position in that mean
 constexpr double kResting = 0.5;      // of the time of rest
 constexpr int kAwayDetections = 2;    // in a row off the place of rest: it has set off
+constexpr double kOutOfSight_s = 0.45;  // what is found after longer may be something else
+constexpr int kFewFree = 3;             // one tested point in so many lies in free space of what surely moves
 
 }  // namespace
 
@@ -103,6 +105,14 @@ DynamicState MotionBelief::fused(const MotionCues& cues, const DynamicStateConfi
     // What comes into view where nothing was ever seen differs from the map, too: that makes it a suspect, no more.
     if (config.use_free_space && free_share(cues) < 0.0 && !cues.sustained_displacement) {
         step = std::min(step, std::max(0.0, kMostUnconfirmed * config.dynamic_log_odds - log_odds_));
+    }
+    // What is found again after a while moves if it stands in free space; else it may be something that rests there,
+    // and its own motion has to be seen anew.
+    const int tested = cues.free_points + cues.occupied_points + cues.unknown_points;
+    if (config.use_free_space && cues.dt_s > kOutOfSight_s && tested >= kMinTested &&
+        kFewFree * cues.free_points < tested && state_ == DynamicState::kDynamic) {
+        log_odds_ = std::min(log_odds_, 0.0);
+        state_ = DynamicState::kUndefined;
     }
     // It moves where it has hidden the space, or been itself: what that space said against motion is taken back.
     if (cues.left_its_place) log_odds_ = std::max(log_odds_, 0.0);

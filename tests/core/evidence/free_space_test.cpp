@@ -138,6 +138,59 @@ TEST(FreeSpace, WhatMovesAwayIsNoLongerWhereItWas) {
     EXPECT_EQ(wall_free, 0) << "came into view behind the box";
 }
 
+/// A leaf that begins to swing away behind a frame: the space that it enters has never been seen, and it was at rest
+/// just before. Only where it has hardly moved it counts as where it was.
+TEST(FreeSpace, ADoorThatOpensAwayIsSeenWithinThreeFrames) {
+    const SensorModel sensor = staggered_sensor();
+    Frame frame(sensor);
+    EvidenceImage evidence(sensor, {});
+    constexpr double kWall_m = 3.0, kWidth_m = 0.95, kHinge_m = -0.5;
+    double angle_rad = 0.0;
+    const auto leaf = [&](const Eigen::Vector3d& o, const Eigen::Vector3d& d) {
+        // In the leaf's own axes: along it, across it, up.
+        const Eigen::AngleAxisd turn(-angle_rad, Eigen::Vector3d::UnitZ());
+        const Eigen::Vector3d hinge(kHinge_m, kWall_m, 0.0);
+        return test::box_range({0.0, 0.0, -0.5}, {kWidth_m, 0.05, 1.5}, turn * (o - hinge), turn * d);
+    };
+    const auto scene = [&](const Eigen::Vector3d& o, const Eigen::Vector3d& d) {
+        const double x = kHinge_m + kWidth_m;
+        double range = test::box_range({-9.0, kWall_m, -0.5}, {kHinge_m, kWall_m + 0.1, 3.0}, o, d);
+        range = test::nearest(range, test::box_range({x, kWall_m, -0.5}, {9.0, kWall_m + 0.1, 3.0}, o, d));
+        range = test::nearest(range, test::plane_range(Eigen::Vector3d::UnitY(), 8.0, o, d));
+        return test::nearest(range, leaf(o, d));
+    };
+    constexpr int kRest = 8;
+    for (int k = 0; k <= kRest + 3; ++k) {
+        angle_rad = std::max(0.0, 1.2 * kPeriod_s * (k - kRest));
+        render_sweep(sensor, scene, k, 0.0, frame);
+        evidence.begin(frame);
+        for (PixelIndex p = 0; p < sensor.pixels(); ++p) {
+            if (frame.cloud.range_m[p] > 0.0F) evidence.request(p);
+        }
+        evidence.run(frame);
+        if (k != kRest && k != kRest + 3) continue;
+        long on_leaf = 0, leaf_free = 0, wall_free = 0;
+        for (const PixelIndex p : evidence.tested()) {
+            const Eigen::Vector3d q =
+                frame.odometry.T_world_sensor *
+                Eigen::Vector3f(frame.odometry.x[p], frame.odometry.y[p], frame.odometry.z[p]).cast<double>();
+            const bool free = evidence[p] == Evidence::kFree;
+            const double along = q.x() - kHinge_m;
+            const bool in_opening = along > 0.4 && along < kWidth_m && q.y() > kWall_m - 0.2 && q.y() < kWall_m + 1.0;
+            on_leaf += in_opening ? 1 : 0;
+            leaf_free += in_opening && free ? 1 : 0;
+            wall_free += !in_opening && (along < 0.0 || along > kWidth_m + 0.1) && free ? 1 : 0;
+        }
+        ASSERT_GT(on_leaf, 200);
+        EXPECT_LE(wall_free, 10);
+        if (k == kRest) {
+            EXPECT_EQ(leaf_free, 0) << "at rest";
+        } else {
+            EXPECT_GE(leaf_free, 0.6 * static_cast<double>(on_leaf)) << "three frames after it set off";
+        }
+    }
+}
+
 TEST(ReferenceImages, AgesAreSpreadAndMemoryIsBounded) {
     const SensorModel sensor = test::even_sensor(4, 64, 0.1, -0.1);
     Frame frame(sensor);

@@ -130,6 +130,24 @@ TEST(DynamicState, WhatWalksAwayIsFoundByItsSustainedDisplacement) {
     }
 }
 
+// A door that has come to rest in its wall is predicted on; what is found there next, a chair behind it, is no door.
+TEST(DynamicState, WhatIsFoundAgainMovesOnlyWhereItWasFree) {
+    const DynamicStateConfig config;
+    for (const bool in_free_space : {false, true}) {
+        MotionBelief belief;
+        for (int n = 0; n < 10; ++n) belief.update(free_cue(60, 10), config);
+        ASSERT_EQ(belief.state(), DynamicState::kDynamic);
+        MotionCues again = free_cue(in_free_space ? 40 : 0, 0);
+        again.unknown_points = 40;
+        again.dt_s = 0.9;
+        belief.update(again, config);
+        EXPECT_EQ(belief.state() == DynamicState::kDynamic, in_free_space);
+        again.dt_s = 0.1;
+        for (int n = 0; n < 5; ++n) belief.update(again, config);
+        EXPECT_EQ(belief.state(), in_free_space ? DynamicState::kDynamic : DynamicState::kStatic);
+    }
+}
+
 TEST(DynamicState, AMistakeIsTakenBack) {
     const DynamicStateConfig config;
     MotionBelief belief;
