@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "driver/frame_builder.hpp"
+#include "tests/driver/clean_frames.hpp"
 #include "tests/driver/synthetic_sensor.hpp"
 
 namespace dlod::driver {
@@ -120,7 +121,7 @@ TEST(FrameBuilder, GarbageHeadersCloseNoGoodFrame) {
     EXPECT_EQ(bench.emitted[1].header.valid_columns, 512);
     EXPECT_EQ(bench.wrong_pixels(bench.emitted[1]), 0);
     EXPECT_EQ(bench.counters().implausible_packets.value(), garbage);
-    bench.expect_clean_frames(102);
+    expect_clean_frames(bench, 102);
 }
 
 TEST(FrameBuilder, WrongSizesAndTypesAreCounted) {
@@ -138,7 +139,7 @@ TEST(FrameBuilder, WrongSizesAndTypesAreCounted) {
         packet, {.type = 2, .frame_id = 2, .init_id = sensor.init_id, .serial_number = sensor.serial_number});
     bench.push(packet);
     EXPECT_EQ(bench.counters().wrong_type_packets.value(), 1U);
-    bench.expect_clean_frames(2);
+    expect_clean_frames(bench, 2);
     EXPECT_EQ(bench.faults(), 8U);
 }
 
@@ -195,7 +196,7 @@ TEST(FrameBuilder, AbsurdColumnTimesAreNotTrusted) {
             bench.emitted[1].columns.valid[m] != 0 ? sensor.time_ns(2, static_cast<int>(m)) : 0;
         EXPECT_EQ(bench.emitted[1].columns.time_ns[m], expected);
     }
-    bench.expect_clean_frames(3);
+    expect_clean_frames(bench, 3);
 }
 
 TEST(FrameBuilder, ClockJumpsBetweenFramesAreCounted) {

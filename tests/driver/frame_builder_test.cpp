@@ -6,6 +6,7 @@
 #include <random>
 #include <vector>
 
+#include "tests/driver/clean_frames.hpp"
 #include "tests/driver/synthetic_sensor.hpp"
 
 namespace dlod::driver {
@@ -270,7 +271,7 @@ TEST(FrameBuilder, WithoutFreeFramesWholeFramesAreDropped) {
     EXPECT_EQ(bench.emitted.size(), 1U);
     EXPECT_EQ(bench.counters().dropped_frames.value(), 2U);
     EXPECT_EQ(bench.counters().dropped_packets.value(), 64U);
-    bench.expect_clean_frames(4);
+    expect_clean_frames(bench, 4);
     EXPECT_EQ(bench.emitted.back().header.sequence, 3U);
 }
 

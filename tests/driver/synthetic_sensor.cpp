@@ -1,7 +1,5 @@
 #include "tests/driver/synthetic_sensor.hpp"
 
-#include <gtest/gtest.h>
-
 #include <array>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -160,16 +158,6 @@ int BuilderBench::wrong_pixels(const EmittedFrame& frame) const {
         }
     }
     return wrong;
-}
-
-void BuilderBench::expect_clean_frames(std::uint32_t first_id) {
-    const std::size_t before = emitted.size();
-    for (std::uint32_t k = 0; k < 3; ++k) push_frame(first_id + k);
-    ASSERT_EQ(emitted.size(), before + 3);
-    for (std::size_t k = 0; k < 3; ++k) {
-        EXPECT_EQ(wrong_pixels(emitted[before + k]), 0);
-        EXPECT_TRUE(emitted[before + k].header.usable);
-    }
 }
 
 std::uint64_t BuilderBench::faults() const {

@@ -72,8 +72,6 @@ class BuilderBench {
     void push(const Packet& packet) { builder.push(packet); }
     /// All packets of a frame, or those of [first, last).
     void push_frame(std::uint32_t frame_id, int first = 0, int last = -1);
-    /// Pushes three clean frames; what came before must not have harmed them.
-    void expect_clean_frames(std::uint32_t first_id);
 
     /// Pixels of the emitted frame that differ from what was sent in valid columns, or from 0 in others.
     int wrong_pixels(const EmittedFrame& frame) const;
