@@ -35,7 +35,8 @@ sanitize() {
     # shellcheck disable=SC2086  # several targets
     cmake --build "build-$1" -j "$jobs" --target $4
     step "$1 sanitizer: tests"
-    ctest --test-dir "build-$1" -j 2 --output-on-failure -R "$5"
+    TSAN_OPTIONS=suppressions=$PWD/tests/support/thread_sanitizer.supp \
+        ctest --test-dir "build-$1" -j 2 --output-on-failure -R "$5"
 }
 for sanitizer in "${sanitizers[@]}"; do
     case $sanitizer in

@@ -11,6 +11,7 @@
 
 #include "tests/daemon/live/live_run.hpp"
 #include "tests/support/fake_sensor.hpp"
+#include "tests/support/sanitizers.hpp"
 
 namespace dlod {
 namespace {
@@ -49,6 +50,7 @@ TEST_F(Faults, KilledAndStartedAgainWhileTheSensorsWebServerIsAway) {
 }
 
 TEST_F(Faults, StoppedForThreeSeconds) {
+    if (test::kTooSlowForTimes) GTEST_SKIP() << "ThreadSanitizer is too slow for this";
     run.start();
     EXPECT_TRUE(run.poses_flow());
     run.daemon->signal(SIGSTOP);
@@ -65,6 +67,7 @@ TEST_F(Faults, StoppedForThreeSeconds) {
 }
 
 TEST_F(Faults, TheProcessorIsTakenAway) {
+    if (test::kTooSlowForTimes) GTEST_SKIP() << "ThreadSanitizer is too slow for this";
     run.start();
     EXPECT_TRUE(run.poses_flow());
     run.subscriber.clear();

@@ -9,6 +9,7 @@
 
 #include "tests/daemon/live/live_run.hpp"
 #include "tests/support/file_content.hpp"
+#include "tests/support/sanitizers.hpp"
 
 namespace dlod {
 namespace {
@@ -34,6 +35,7 @@ void expect_same_by_replay(const std::filesystem::path& recording, const std::fi
 }
 
 TEST(Live, NoFrameIsLostFromPacketToSubscriberAndTheRecordingGivesTheSame) {
+    if (test::kTooSlowForTimes) GTEST_SKIP() << "ThreadSanitizer is too slow for this";
 #ifndef DLOD_SIM_BINARY
     GTEST_SKIP() << "the simulator is not built";
 #else

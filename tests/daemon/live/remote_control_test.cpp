@@ -23,6 +23,7 @@
 #include <thread>
 
 #include "tests/support/child_process.hpp"
+#include "tests/support/sanitizers.hpp"
 #include "tests/support/synthetic_capture.hpp"
 
 namespace dlod {
@@ -180,6 +181,7 @@ std::map<std::string, std::int64_t> counters_of(const status_t& status) {
 }
 
 TEST(RemoteControl, ALiveRunDoesWhatItIsToldAndTellsWhatPlannersNeed) {
+    if (test::kTooSlowForTimes) GTEST_SKIP() << "ThreadSanitizer is too slow for this";
     const test::TemporaryFolder folder;
     if (!test::enter_network_namespace()) GTEST_LOG_(INFO) << "no namespace of its own: on the host's loopback";
     Operator op;

@@ -7,6 +7,7 @@
 
 #include "tests/daemon/live/live_run.hpp"
 #include "tests/support/fake_sensor.hpp"
+#include "tests/support/sanitizers.hpp"
 
 namespace dlod {
 namespace {
@@ -26,6 +27,7 @@ auto sensor_is(const std::string& text) {
 }
 
 TEST(SensorChanges, AwaitedUnpluggedRestartedAndReplaced) {
+    if (test::kTooSlowForTimes) GTEST_SKIP() << "ThreadSanitizer is too slow for this";
     LiveRun run;
     if (!run.usable()) GTEST_SKIP() << "no multicast here";
     FakeSensor sensor(on_live_ports());

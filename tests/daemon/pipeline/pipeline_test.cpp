@@ -11,6 +11,7 @@
 #include "driver/paced_source.hpp"
 #include "driver/pcap_source.hpp"
 #include "tests/support/file_content.hpp"
+#include "tests/support/sanitizers.hpp"
 #include "tests/support/synthetic_capture.hpp"
 
 namespace dlod::daemon {
@@ -231,6 +232,7 @@ class ImpatientSource final : public driver::PacketSource {
 };
 
 TEST_F(PipelineTest, LiveTheNewestFramesWinAndEveryDropIsCounted) {
+    if (test::kTooSlowForTimes) GTEST_SKIP() << "ThreadSanitizer is too slow for this";
     const test::SyntheticCapture capture(60);
     ImpatientSource source(capture);
     std::vector<std::uint64_t> written;
@@ -261,6 +263,7 @@ TEST_F(PipelineTest, LiveTheNewestFramesWinAndEveryDropIsCounted) {
 }
 
 TEST_F(PipelineTest, LiveWithHalfTheTimeItNeedsLatencyIsBounded) {
+    if (test::kTooSlowForTimes) GTEST_SKIP() << "ThreadSanitizer is too slow for this";
     driver::PacedSource source(std::make_unique<driver::PcapSource>(capture_), 1.0);
     std::vector<float> latencies_ms;
     std::vector<std::uint64_t> poses;
