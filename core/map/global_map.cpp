@@ -19,6 +19,12 @@ constexpr std::int64_t kDecisecond_ns = 100'000'000;
 constexpr std::int64_t kLongestTurn_ns =
     1'000'000'000;  // a longer step is the clock's, or a gap in which nothing was seen
 
+// Objects longer than people are seen in pieces, not all of which are known to be theirs: what lies in their boxes, and
+// not on the ground, is kept out.
+constexpr double kSeenInPieces_m = 2.5;
+constexpr double kPieceMargin_m = 0.2;
+constexpr double kGroundClearance_m = 0.15;
+
 constexpr std::size_t kRowStep = 4;
 /// Near pixels lie many to a cell: of the pixels of a row every eighth, fourth, second, every one enters.
 constexpr float kNearest_m = 4.0F, kNear_m = 8.0F, kMiddle_m = 16.0F;
@@ -68,6 +74,35 @@ void place_points(std::size_t count, const PixelIndex* __restrict pixel, const f
     }
 }
 
+/// A moving object, seen in this frame, that is too large to be seen as one.
+bool is_seen_in_pieces(const Track& track) {
+    return track.state == DynamicState::kDynamic && track.points > 0 &&
+           track.box.size_m.head<2>().maxCoeff() >= kSeenInPieces_m;
+}
+
+/// Where the pieces of such an object are.
+OrientedBox box_of_pieces(const Track& track) {
+    OrientedBox box = track.box;
+    box.size_m += Eigen::Vector3d(2.0 * kPieceMargin_m, 2.0 * kPieceMargin_m, kPieceMargin_m - kGroundClearance_m);
+    box.center_m.z() += 0.5 * (kPieceMargin_m + kGroundClearance_m);
+    return box;
+}
+
+/// Marks the points that lie in a box, given as centre, half sizes and direction of its length.
+DLOD_MULTIVERSION
+void mark_inside(std::size_t count, const float* __restrict x, const float* __restrict y, const float* __restrict z,
+                 const float* __restrict center, const float* __restrict half, float cosine, float sine,
+                 std::uint8_t* __restrict inside) {
+    const float cx = center[0], cy = center[1], cz = center[2];
+    const float hx = half[0], hy = half[1], hz = half[2];
+    for (std::size_t i = 0; i < count; ++i) {
+        const float dx = x[i] - cx, dy = y[i] - cy, dz = z[i] - cz;
+        const bool along = std::abs(cosine * dx + sine * dy) <= hx;
+        const bool across = std::abs(cosine * dy - sine * dx) <= hy;
+        inside[i] |= static_cast<std::uint8_t>(along & across & (std::abs(dz) <= hz));
+    }
+}
+
 }  // namespace
 
 struct GlobalMap::State {
@@ -83,6 +118,7 @@ struct GlobalMap::State {
             p.points.resize(0);
         }
         selected.resize(selected_capacity());
+        inside.reserve(selected_capacity());
         enters.resize(static_cast<std::size_t>(sensor.width));
     }
 
@@ -94,6 +130,7 @@ struct GlobalMap::State {
     }
     void postpone(const Frame& frame, Postponed& out);
     std::size_t select(const Frame& frame);
+    void leave_out_pieces(const std::vector<Track>& tracks, MapPoints& points);
     void enter(Postponed& postponed);
     void clear_some(std::size_t budget);
     void sweep_unconfirmed();
@@ -106,6 +143,7 @@ struct GlobalMap::State {
     std::vector<Postponed> waiting;      ///< ring over the frames
     AlignedVector<PixelIndex> selected;  ///< pixels of the frame at hand that enter
     AlignedVector<std::uint8_t> enters;  ///< of the row at hand
+    AlignedVector<std::uint8_t> inside;  ///< of the points at hand: 1 in the box of a moving object
     std::uint64_t frames = 0;
     std::int64_t last_stamp_ns = 0;
     std::int64_t time_ns = 0;          ///< time that has passed, whatever the sensor's clock did
@@ -163,6 +201,30 @@ void GlobalMap::State::postpone(const Frame& frame, Postponed& out) {
     }
     place_points(count, selected.data(), frame.odometry.x.data(), frame.odometry.y.data(), frame.odometry.z.data(),
                  T_world_sensor, out.points.x.data(), out.points.y.data(), out.points.z.data());
+    leave_out_pieces(frame.detection.tracks, out.points);
+}
+
+void GlobalMap::State::leave_out_pieces(const std::vector<Track>& tracks, MapPoints& points) {
+    bool any = false;
+    for (const Track& track : tracks) {
+        if (!is_seen_in_pieces(track)) continue;
+        const OrientedBox box = box_of_pieces(track);
+        if (!any) inside.assign(points.size(), 0);
+        any = true;
+        const Eigen::Vector3f center = box.center_m.cast<float>(), half = (0.5 * box.size_m).cast<float>();
+        mark_inside(points.size(), points.x.data(), points.y.data(), points.z.data(), center.data(), half.data(),
+                    static_cast<float>(std::cos(box.yaw_rad)), static_cast<float>(std::sin(box.yaw_rad)),
+                    inside.data());
+    }
+    if (!any) return;
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        points.x[kept] = points.x[i];
+        points.y[kept] = points.y[i];
+        points.z[kept] = points.z[i];
+        kept += inside[i] == 0 ? 1 : 0;
+    }
+    points.resize(kept);
 }
 
 // Every fourth row, another one each time, so that four frames see all; of near surfaces, which fill many pixels of a

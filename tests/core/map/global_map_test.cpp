@@ -160,5 +160,30 @@ TEST_F(GlobalMapTest, WhatPassesLeavesNoTrace) {
     EXPECT_GT(count_at(map, 5.0), 700);
 }
 
+/// Of a bus only some pieces are known to be its own; the others slide along where they were.
+TEST_F(GlobalMapTest, PiecesOfALargeMovingObjectLeaveNoTrace) {
+    for (const bool moves : {false, true}) {
+        GlobalMap map(sensor, config);
+        for (int k = 0; k < 40; ++k) {
+            see_wall();
+            Track bus;
+            bus.state = moves ? DynamicState::kDynamic : DynamicState::kUndefined;
+            bus.box.center_m = {5.0, 0.0, 0.0};
+            bus.box.size_m = {2.5, 12.0, 3.2};
+            bus.points = 100;
+            scene.frame.detection.tracks = {bus};
+            map.update(scene.frame);
+        }
+        map.finish();
+        int above_ground = 0;
+        for (const MapPoint& p : map.points()) above_ground += p.z > -1.4F ? 1 : 0;
+        if (moves) {
+            EXPECT_EQ(above_ground, 0);
+        } else {
+            EXPECT_GT(above_ground, 500);
+        }
+    }
+}
+
 }  // namespace
 }  // namespace dlod
