@@ -18,6 +18,7 @@ constexpr double kMinShare = 0.25;    // of those that its track had: it was not
 constexpr double kSeenShare = 0.5;    // of a track's pixels: there it is, if not whole
 constexpr double kLargestBody_m = 1.5;
 constexpr double kLeastHeight = 0.6;   // of the tallest: a lower one may be a limb of it
+constexpr float kPlace_m = 0.4F;       // the middles of two bodies are no nearer
 constexpr int kRounds = 3;             // of sharing by middles
 constexpr double kMoving = 0.5;        // belief from which a track is worth being cut out
 constexpr double kSameSize = 1.3;      // footprint diagonals up to that ratio
@@ -132,9 +133,21 @@ bool MergedDetections::share_out(const Detection& whole, const DetectionShapes& 
                   return size.head<2>().maxCoeff() < kLargestBody_m && size.z() > kLeastHeight * tallest_m;
               });
     for (int k = 0; bodies_ && k < kRounds; ++k) share_by_middles(whole, shapes);
+    if (bodies_ && !stand_apart()) return false;
     for (std::size_t k = 0; k < covered_.size(); ++k) {
         const double expected = kMinShare * tracks[covered_[k]].points;
         if (static_cast<double>(counts_[k]) < std::max(kMinPart, expected)) return false;
+    }
+    return true;
+}
+
+// Nobody stands in another's place: parts of one body that two tracks share are nearer to each other.
+bool MergedDetections::stand_apart() const {
+    for (std::size_t a = 0; a < middles_.size(); ++a) {
+        for (std::size_t b = 0; b < a; ++b) {
+            const float dx = middles_[a].x - middles_[b].x, dy = middles_[a].y - middles_[b].y;
+            if (dx * dx + dy * dy < kPlace_m * kPlace_m) return false;
+        }
     }
     return true;
 }

@@ -43,6 +43,8 @@ class MergedDetections {
     bool share_out(const Detection& whole, const DetectionShapes& shapes, std::span<const ExpectedTrack> tracks);
     /// Gives each point to the nearest of the middles of the parts' upper bodies.
     void share_by_middles(const Detection& whole, const DetectionShapes& shapes);
+    /// Whether those middles are those of different bodies.
+    bool stand_apart() const;
     /// Likewise for the one track covered_ and the rest.
     bool cut_out(const Detection& whole, const DetectionShapes& shapes, const ExpectedTrack& track);
     /// Likewise for two people who stand apart, one half hidden by the other: there is a gap between their upper

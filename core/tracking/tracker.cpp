@@ -103,10 +103,10 @@ bool one_vehicle(const TrackedObject& whole, const TrackedObject& piece) {
            piece.box().size_m.head<2>().norm() < whole.box().size_m.head<2>().norm();
 }
 
-/// A track on something low inside of a moving object's box has followed an arm or a leg.
-bool is_limb_of(const TrackedObject& host, const TrackedObject& guest) {
+/// A track that sees something low, and is expected inside of a moving object's box, has followed an arm or a leg.
+bool is_limb_of(const TrackedObject& host, const TrackedObject& guest, const Detection& seen) {
     return host.state() == DynamicState::kDynamic && host.hits() >= kYoungHits &&
-           guest.box().size_m.z() < kLowLimb * host.box().size_m.z() &&
+           seen.box.size_m.z() < kLowLimb * host.box().size_m.z() &&
            share_inside(guest.box(), host.box(), kPartMargin_m) > kInside;
 }
 
@@ -276,7 +276,8 @@ void Tracker::State::attach_parts(Frame& frame) {
                 const bool on_top = host.id() < guest->id() && stacked(detections[other].box, detections[d].box) &&
                                     !is_body_beside(host, *guest);
                 const bool young = guest->hits() < kYoungHits && host.hits() >= 2 * guest->hits();
-                const bool piece = kLimb * detections[d].count < detections[other].count && is_limb_of(host, *guest);
+                const bool piece =
+                    kLimb * detections[d].count < detections[other].count && is_limb_of(host, *guest, detections[d]);
                 if (!on_top && !young && !piece && !one_vehicle(host, *guest)) continue;
                 if (on_top) reach = kLimbMargin_m;
             } else if (host.state() == DynamicState::kDynamic &&
