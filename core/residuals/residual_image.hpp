@@ -12,7 +12,9 @@ namespace dlod {
 /// arrive with their pixel index; nothing is re-projected.
 class ResidualImage {
   public:
-    explicit ResidualImage(const SensorModel& sensor) : image_(sensor.height, sensor.width) {}
+    explicit ResidualImage(const SensorModel& sensor) : image_(sensor.height, sensor.width) {
+        filled_.reserve(sensor.pixels());
+    }
     void update(const OdometryResult& odometry);
     const Image<float>& image() const { return image_; }
 
