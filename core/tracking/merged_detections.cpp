@@ -164,8 +164,12 @@ void MergedDetections::share_by_middles(const Detection& whole, const DetectionS
         m.y += points.y[i];
         m.count += 1.0F;
     }
+    const auto few = [](const Middle& m) { return m.count < static_cast<float>(kMinPart); };
+    if (std::any_of(middles_.begin(), middles_.end(), few)) {
+        middles_.clear();
+        return;
+    }
     for (Middle& m : middles_) {
-        if (m.count < static_cast<float>(kMinPart)) return;
         m.x /= m.count;
         m.y /= m.count;
     }

@@ -41,9 +41,9 @@ class MergedDetections {
   private:
     /// Fills owner_ and counts_ for the tracks covered_; false where a part would be too small.
     bool share_out(const Detection& whole, const DetectionShapes& shapes, std::span<const ExpectedTrack> tracks);
-    /// Gives each point to the nearest of the middles of the parts' upper bodies.
+    /// Gives each point to the nearest of the middles of the parts' upper bodies, where enough of each is seen.
     void share_by_middles(const Detection& whole, const DetectionShapes& shapes);
-    /// Whether those middles are those of different bodies.
+    /// Whether those middles may be those of different bodies.
     bool stand_apart() const;
     /// Likewise for the one track covered_ and the rest.
     bool cut_out(const Detection& whole, const DetectionShapes& shapes, const ExpectedTrack& track);
