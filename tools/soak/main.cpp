@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
+#include <limits>
 #include <string>
 #include <thread>
 #include <utility>
@@ -92,20 +93,16 @@ void print_row(double minute, const Row& row, const Row& before) {
     std::fflush(stdout);
 }
 
-double median(std::vector<double> values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
-
-/// How much longer the median frame took in the second half than in the first.
+/// How much longer the median frame took in the best minute of the second half than in that of the first: other
+/// programs hold up some minutes, what grows in the service holds up all of them.
 double latency_growth_ms(const std::vector<Row>& rows) {
     if (rows.size() < 2) return 0.0;
-    std::vector<double> halves[2];
+    double best_ms[2] = {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
     for (std::size_t i = 0; i < rows.size(); ++i) {
-        halves[2 * i / rows.size()].push_back(latency(rows[i].seen.last_status).p50_ms);
+        double& best = best_ms[2 * i / rows.size()];
+        best = std::min(best, latency(rows[i].seen.last_status).p50_ms);
     }
-    return median(halves[1]) - median(halves[0]);
+    return best_ms[1] - best_ms[0];
 }
 
 /// One line a demand; @return true where all are met.
@@ -143,7 +140,8 @@ bool judge(const std::vector<Row>& rows, const PoseErrors& without_faults, const
     at_most("largest error of a position, cm", 100.0 * worst_position_m,
             kPositionFloor_cm + 100.0 * options.most_position_error * without_faults.worst_position_m);
     at_most("worst p99 of the latency, ms", worst_p99_ms, options.most_latency_ms);
-    at_most("growth of the median latency from the first half to the second, ms", latency_growth_ms(rows), 10.0);
+    at_most("growth of the median latency, best minute of the second half to that of the first, ms",
+            latency_growth_ms(rows), 10.0);
     // The map and the history fill up at first.
     const std::size_t settled = rows.size() / 2;
     at_most("growth of memory over the second half, %",
