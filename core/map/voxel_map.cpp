@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::size_t kInitialTable = std::size_t{1} << 13;  // blocks
 constexpr std::size_t kInitialVoxels = std::size_t{1} << 15;
+constexpr std::size_t kInitialFacets = std::size_t{1} << 16;
 
 std::int32_t floor_divide(std::int32_t a, std::int32_t b) {
     const std::int32_t q = a / b;
@@ -26,10 +27,12 @@ VoxelMap::VoxelMap(const VoxelMapConfig& config) : config_(config) {
     table_.resize(kInitialTable);
     blocks_.reserve(kInitialTable / 2);
     free_blocks_.reserve(kInitialTable / 2);
-    moments_.reserve(kInitialVoxels);
-    planes_.reserve(kInitialVoxels);
-    fitted_.reserve(kInitialVoxels);
-    free_.reserve(kInitialVoxels);
+    voxels_.reserve(kInitialVoxels);
+    voxel_planes_.reserve(kInitialVoxels);
+    free_voxels_.reserve(kInitialVoxels);
+    facets_.reserve(kInitialFacets);
+    facet_planes_.reserve(kInitialFacets);
+    free_facets_.reserve(kInitialFacets);
 }
 
 void VoxelMap::clear() {
@@ -38,10 +41,12 @@ void VoxelMap::clear() {
     free_blocks_.clear();
     block_count_ = 0;
     last_key_ = kEmpty;
-    moments_.clear();
-    planes_.clear();
-    fitted_.clear();
-    free_.clear();
+    voxels_.clear();
+    voxel_planes_.clear();
+    free_voxels_.clear();
+    facets_.clear();
+    facet_planes_.clear();
+    free_facets_.clear();
     voxel_count_ = 0;
 }
 
@@ -70,16 +75,41 @@ std::uint32_t VoxelMap::make_block(std::uint64_t key) {
 
 std::uint32_t VoxelMap::make_voxel() {
     ++voxel_count_;
-    if (free_.empty()) {
-        moments_.emplace_back();
-        planes_.emplace_back();
-        fitted_.push_back(0);
-        return static_cast<std::uint32_t>(moments_.size() - 1);
+    std::uint32_t slot;
+    if (free_voxels_.empty()) {
+        slot = static_cast<std::uint32_t>(voxels_.size());
+        voxels_.emplace_back();
+        voxel_planes_.emplace_back();
+    } else {
+        slot = free_voxels_.back();
+        free_voxels_.pop_back();
     }
-    const std::uint32_t slot = free_.back();
-    free_.pop_back();
-    moments_[slot] = Moments{};
+    voxels_[slot].facet.fill(kNone);
+    voxels_[slot].facets = 0;
     return slot;
+}
+
+std::uint32_t VoxelMap::make_facet() {
+    if (free_facets_.empty()) {
+        facets_.emplace_back();
+        facet_planes_.emplace_back();
+        return static_cast<std::uint32_t>(facets_.size() - 1);
+    }
+    const std::uint32_t slot = free_facets_.back();
+    free_facets_.pop_back();
+    facets_[slot] = Facet{};
+    return slot;
+}
+
+/// The axis of the world that the normal is nearest to, and its sign.
+std::size_t VoxelMap::facet_of(const FixedPoint& p) {
+    const int n[3] = {p.nx, p.ny, p.nz};
+    std::size_t axis = 0;
+    for (std::size_t i = 1; i < 3; ++i) {
+        if (std::abs(n[i]) > std::abs(n[axis])) axis = i;
+    }
+    if (n[axis] == 0) return kNoNormal;
+    return 2 * axis + (n[axis] > 0 ? 1 : 0);
 }
 
 void VoxelMap::accumulate(std::span<const FixedPoint> points, int sign) {
@@ -95,12 +125,19 @@ void VoxelMap::accumulate(std::span<const FixedPoint> points, int sign) {
             slot = make_voxel();
             blocks_[block].occupied |= std::uint64_t{1} << position;
         }
-        Moments& m = moments_[slot];
+        Voxel& voxel = voxels_[slot];
+        const std::size_t side = facet_of(p);
+        if (voxel.facet[side] == kNone) {
+            voxel.facet[side] = make_facet();
+            ++voxel.facets;
+        }
+        Facet& facet = facets_[voxel.facet[side]];
+        Moments& m = facet.moments;
         const std::int64_t d[3] = {p.x - (std::int64_t{index.x} * side_ + side_ / 2),
                                    p.y - (std::int64_t{index.y} * side_ + side_ / 2),
                                    p.z - (std::int64_t{index.z} * side_ + side_ / 2)};
         const std::int64_t n[3] = {p.nx, p.ny, p.nz};
-        const bool disc = p.nx != 0 || p.ny != 0 || p.nz != 0;
+        const bool disc = side != kNoNormal;
         const std::int32_t weight = disc ? sign * kFlatWeight : sign;
         m.points += sign;
         m.weight += weight;
@@ -111,9 +148,14 @@ void VoxelMap::accumulate(std::span<const FixedPoint> points, int sign) {
                 m.square[k] += weight * (d[i] * d[j] + own);
             }
         }
-        fitted_[slot] = 0;
+        facet.fitted = voxel.fitted = false;
         if (m.points == 0) {
-            free_.push_back(slot);
+            free_facets_.push_back(voxel.facet[side]);
+            voxel.facet[side] = kNone;
+            --voxel.facets;
+        }
+        if (voxel.facets == 0) {
+            free_voxels_.push_back(slot);
             slot = kNone;
             --voxel_count_;
             blocks_[block].occupied &= ~(std::uint64_t{1} << position);
@@ -149,10 +191,56 @@ void VoxelMap::grow() {
     }
 }
 
-void VoxelMap::fit(std::uint32_t slot) {
-    fitted_[slot] = 1;
-    const Moments& m = moments_[slot];
-    VoxelPlane& plane = planes_[slot];
+const VoxelPlane* VoxelMap::find_facet(VoxelIndex index, const float normal[3]) {
+    const std::uint32_t slot = voxel_at(index);
+    if (slot == kNone) return nullptr;
+    const VoxelPlane* best = nullptr;
+    float most = 0.0F;
+    for (std::size_t side = 0; side < kNoNormal; ++side) {
+        const std::uint32_t facet = voxels_[slot].facet[side];
+        if (facet == kNone) continue;
+        if (!facets_[facet].fitted) fit_facet(facet);
+        const VoxelPlane& plane = facet_planes_[facet];
+        if (!plane.flat) continue;
+        // The fit gives the normal but for its sign; the facet's side has it.
+        const float sign = (plane.normal[side / 2] > 0.0F) == (side % 2 == 1) ? 1.0F : -1.0F;
+        const float cosine =
+            sign * (plane.normal[0] * normal[0] + plane.normal[1] * normal[1] + plane.normal[2] * normal[2]);
+        if (cosine > most) {
+            most = cosine;
+            best = &plane;
+        }
+    }
+    return best;
+}
+
+void VoxelMap::fit_facet(std::uint32_t slot) {
+    facets_[slot].fitted = true;
+    fit(facets_[slot].moments, facet_planes_[slot]);
+}
+
+/// All facets together; one alone is the voxel.
+void VoxelMap::fit_voxel(std::uint32_t slot) {
+    Voxel& voxel = voxels_[slot];
+    voxel.fitted = true;
+    Moments all;
+    for (const std::uint32_t i : voxel.facet) {
+        if (i == kNone) continue;
+        if (voxel.facets == 1) {
+            if (!facets_[i].fitted) fit_facet(i);
+            voxel_planes_[slot] = facet_planes_[i];
+            return;
+        }
+        const Moments& m = facets_[i].moments;
+        all.points += m.points;
+        all.weight += m.weight;
+        for (std::size_t k = 0; k < 3; ++k) all.sum[k] += m.sum[k];
+        for (std::size_t k = 0; k < 6; ++k) all.square[k] += m.square[k];
+    }
+    fit(all, voxel_planes_[slot]);
+}
+
+void VoxelMap::fit(const Moments& m, VoxelPlane& plane) const {
     plane.points = static_cast<std::uint32_t>(m.points);
     const double n = m.weight;
     const auto sum = [&](std::size_t k) { return static_cast<double>(m.sum[k]); };

@@ -1,8 +1,12 @@
 // The local map: voxels that hold the moments of the surface elements inside them, in a hash of blocks of 4 x 4 x 4
 // voxels: neighbours share a block, so that points of a scan line find theirs without a new search.
 //
+// A voxel has a facet for each of the six sides that its surfaces may face. So a door frame, a pillar or the end of a
+// wall keeps a plane of its own beside the wall's, where one plane for all would be neither: in corridors these narrow
+// faces are all that tells how far the robot has come. The two sides of a thin wall are not mixed up either.
+//
 // Moments are integers in fixed point, so that adding and removing points is exact and independent of their order: a
-// keyframe that leaves takes away precisely what it brought. A voxel's plane is fitted when it is first asked for.
+// keyframe that leaves takes away precisely what it brought. Planes are fitted when they are first asked for.
 #pragma once
 
 #include <Eigen/Core>
@@ -75,8 +79,11 @@ class VoxelMap {
     /// Takes away points that have been added before.
     void remove(std::span<const FixedPoint> points) { accumulate(points, -1); }
 
-    /// The voxel's plane, nullptr where it is empty. Fits it if needed.
+    /// The plane of all that is in the voxel, nullptr where it is empty. Fits it if needed.
     const VoxelPlane* find(VoxelIndex index);
+    /// Of the voxel's flat facets the one that faces most nearly where `normal` (unit) points; nullptr: none faces that
+    /// half of all directions.
+    const VoxelPlane* find_facet(VoxelIndex index, const float normal[3]);
 
     /// Calls f(index, plane) for each occupied voxel of the 3 x 3 x 3 around `center`.
     template <class F>
@@ -95,6 +102,18 @@ class VoxelMap {
         std::array<std::int64_t, 6> square{};  ///< xx, xy, xz, yy, yz, zz, with the discs' own
     };
     static constexpr std::uint32_t kNone = ~std::uint32_t{0};
+    /// The six sides that a surface may face, and one for points without a normal.
+    static constexpr std::size_t kFacets = 7;
+    static constexpr std::size_t kNoNormal = 6;
+    struct Voxel {
+        std::array<std::uint32_t, kFacets> facet;  ///< slots, kNone where there is none
+        std::int32_t facets = 0;
+        bool fitted = false;
+    };
+    struct Facet {
+        Moments moments;
+        bool fitted = false;
+    };
     static constexpr std::uint64_t kEmpty = ~std::uint64_t{0};
     static constexpr int kBlockBits = 2;  ///< a block has 2^kBlockBits voxels a side
     static constexpr std::size_t kBlockVoxels = std::size_t{1} << (3 * kBlockBits);
@@ -113,11 +132,16 @@ class VoxelMap {
     std::size_t locate(std::uint64_t key) const;  ///< entry of the key, or the empty entry where it would go
     std::uint32_t block_of(std::uint64_t key);    ///< kNone where there is none
     std::uint32_t make_block(std::uint64_t key);
+    static std::size_t facet_of(const FixedPoint& p);
     std::uint32_t make_voxel();
+    std::uint32_t make_facet();
+    std::uint32_t voxel_at(VoxelIndex index);  ///< kNone where it is empty
     void accumulate(std::span<const FixedPoint> points, int sign);
     void erase_block(std::uint64_t key);
     void grow();
-    void fit(std::uint32_t slot);
+    void fit(const Moments& moments, VoxelPlane& plane) const;
+    void fit_facet(std::uint32_t slot);
+    void fit_voxel(std::uint32_t slot);
 
     VoxelMapConfig config_;
     std::int32_t side_;
@@ -128,10 +152,12 @@ class VoxelMap {
     std::size_t block_count_ = 0;
     std::uint64_t last_key_ = kEmpty;  ///< of the block that was asked for last
     std::uint32_t last_block_ = kNone;
-    std::vector<Moments> moments_;      ///< by slot
-    std::vector<VoxelPlane> planes_;    ///< by slot
-    std::vector<std::uint8_t> fitted_;  ///< by slot
-    std::vector<std::uint32_t> free_;   ///< slots
+    std::vector<Voxel> voxels_;               ///< by slot
+    std::vector<VoxelPlane> voxel_planes_;    ///< by slot
+    std::vector<std::uint32_t> free_voxels_;  ///< slots
+    std::vector<Facet> facets_;               ///< by slot of its own
+    std::vector<VoxelPlane> facet_planes_;    ///< likewise
+    std::vector<std::uint32_t> free_facets_;  ///< likewise
     std::size_t voxel_count_ = 0;
 };
 
@@ -169,13 +195,16 @@ inline std::uint32_t VoxelMap::block_of(std::uint64_t key) {
     return last_block_;
 }
 
-inline const VoxelPlane* VoxelMap::find(VoxelIndex index) {
+inline std::uint32_t VoxelMap::voxel_at(VoxelIndex index) {
     const std::uint32_t block = block_of(key_of(index));
-    if (block == kNone) return nullptr;
-    const std::uint32_t slot = blocks_[block].slot[position_in_block(index)];
+    return block == kNone ? kNone : blocks_[block].slot[position_in_block(index)];
+}
+
+inline const VoxelPlane* VoxelMap::find(VoxelIndex index) {
+    const std::uint32_t slot = voxel_at(index);
     if (slot == kNone) return nullptr;
-    if (!fitted_[slot]) fit(slot);
-    return &planes_[slot];
+    if (!voxels_[slot].fitted) fit_voxel(slot);
+    return &voxel_planes_[slot];
 }
 
 template <class F>
@@ -204,8 +233,8 @@ void VoxelMap::for_each_around(VoxelIndex center, F&& f) {
                     const VoxelIndex index{bx * kSide + (bit & 3), by * kSide + ((bit >> 2) & 3),
                                            bz * kSide + (bit >> 4)};
                     const std::uint32_t slot = blocks_[block].slot[static_cast<std::size_t>(bit)];
-                    if (!fitted_[slot]) fit(slot);
-                    f(index, planes_[slot]);
+                    if (!voxels_[slot].fitted) fit_voxel(slot);
+                    f(index, voxel_planes_[slot]);
                 }
             }
         }

@@ -74,14 +74,18 @@ void ScanToSubmap::match(const PointSelection& points, std::span<const std::uint
         if (points.planarity[i] <= 0.0F || excluded[i]) continue;
         const float q[3] = {placed.x[i], placed.y[i], placed.z[i]};
         const Cell cell = cell_of(q, origin, side, inverse_side);
+        const bool raw = points.nx[i] == 0.0F && points.ny[i] == 0.0F && points.nz[i] == 0.0F;
+        const float normal[3] = {placed.nx[i], placed.ny[i], placed.nz[i]};
         const VoxelPlane* plane = map.find(cell.index);
+        // A voxel that is not flat as a whole, or not as the point is, may have a facet that faces as the point does.
+        if (!raw && plane != nullptr && (!plane->flat || std::abs(dot(normal, plane->normal)) < min_cosine)) {
+            plane = map.find_facet(cell.index, normal);
+        }
         if (plane == nullptr || !plane->flat) continue;
         const float d[3] = {cell.offset[0] - plane->mean[0], cell.offset[1] - plane->mean[1],
                             cell.offset[2] - plane->mean[2]};
         const float residual = dot(d, plane->normal);
         if (std::abs(residual) > gate) continue;
-        const float normal[3] = {placed.nx[i], placed.ny[i], placed.nz[i]};
-        const bool raw = points.nx[i] == 0.0F && points.ny[i] == 0.0F && points.nz[i] == 0.0F;
         if (!raw && std::abs(dot(normal, plane->normal)) < min_cosine) continue;
         const float fall = 1.0F / (1.0F + residual * residual * inverse_kernel2);
         const float weight = points.planarity[i] * fall * fall / (plane->thickness_m * plane->thickness_m);

@@ -113,6 +113,31 @@ TEST(VoxelMap, ClutterDoesNotTiltAPlane) {
     EXPECT_NEAR(plane->mean[2], 400 * kMapUnit_m - 0.25, 1e-3);
 }
 
+TEST(VoxelMap, ADoorFrameBesideAWallKeepsItsOwnPlane) {
+    // A wall that faces +y, a narrow face towards -x before it, and the other side of the thin wall.
+    std::mt19937_64 random(8);
+    std::uniform_int_distribution<std::int32_t> place(100, 1900);
+    std::vector<FixedPoint> points;
+    for (int i = 0; i < 60; ++i) points.push_back({place(random), 400, place(random), 0, kNormalUnits, 0});
+    for (int i = 0; i < 8; ++i) points.push_back({1500, 400 + 40 * i, place(random), -kNormalUnits, 0, 0});
+    for (int i = 0; i < 30; ++i) points.push_back({place(random), 100, place(random), 0, -kNormalUnits, 0});
+    VoxelMap map{VoxelMapConfig{}};
+    map.add(points);
+    const auto expect = [&](const Eigen::Vector3f& normal, int axis, std::int32_t at) {
+        const VoxelPlane* plane = map.find_facet({0, 0, 0}, normal.data());
+        ASSERT_NE(plane, nullptr);
+        EXPECT_GT(std::abs(plane->normal[axis]), 0.999F);
+        EXPECT_NEAR(plane->mean[axis], at * kMapUnit_m - 0.25, 1e-3);
+    };
+    expect({0.1F, 0.99F, 0.0F}, 1, 400);
+    expect({-0.95F, 0.2F, 0.1F}, 0, 1500);
+    expect({0.0F, -1.0F, 0.0F}, 1, 100);
+    const float away[3] = {0.9F, 0.0F, 0.0F};
+    const VoxelPlane* none = map.find_facet({0, 0, 0}, away);
+    EXPECT_TRUE(none == nullptr || std::abs(none->normal[0]) < 0.1F);
+    EXPECT_EQ(map.find_facet({5, 0, 0}, away), nullptr);
+}
+
 TEST(VoxelMap, WalksAllOccupiedNeighboursOnce) {
     VoxelMap map{VoxelMapConfig{}};
     const auto points = random_points(20000, 5);
