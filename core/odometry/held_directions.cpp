@@ -9,8 +9,8 @@ struct Return {
     double demand;
     int frames;
 };
-constexpr Return kWithImu{3.0, 5};
-constexpr Return kWithoutImu{2.0, 3};
+constexpr Return kWithImu{9.0, 5};
+constexpr Return kWithoutImu{6.0, 3};
 
 }  // namespace
 

@@ -13,9 +13,9 @@ constexpr double kClearShare = 0.1;
 // A match faces a direction of translation from this cosine on, one of rotation from this share of its lever on.
 constexpr float kFacingCosine = 0.3F;
 constexpr float kFacingLever = 0.1F;
-// As many facing matches make a direction observable, or as many per thousand of all.
-constexpr double kFacingMatches = 15.0;
-constexpr double kFacingPerMille = 5.0;
+// As many facing matches make a direction observable. In a bare tunnel there is none; how much they say is weighed
+// against the prediction by their information.
+constexpr double kFacingMatches = 5.0;
 
 /// The part of a match along a direction.
 float part_along(const PlaneMatches& matches, std::size_t i, int block, const Eigen::Vector3f& u) {
@@ -31,7 +31,7 @@ bool faces(const PlaneMatches& matches, std::size_t i, int block, float along) {
 
 Observability Observability::of(const PlaneMatches& matches, const NormalEquations& equations, double demand) {
     Observability result;
-    const double least = demand * std::max(kFacingMatches, 1e-3 * kFacingPerMille * static_cast<double>(matches.count));
+    const double least = demand * kFacingMatches;
     for (const int block : {0, 3}) {
         Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
         const Eigen::Matrix3d information = equations.A[0].block<3, 3>(block, block);

@@ -232,11 +232,11 @@ TEST(Odometry, HoldsTheDirectionThatATunnelHides) {
     };
     SimulatedDrive drive(tunnel, drive_along);
     OdometryRun run(drive, {});
-    run.run(0, 50);
+    run.run(0, 55);
     const RunFrame& last = run.frames.back();
     EXPECT_TRUE(last.flags & OdometryResult::kDegenerate);
     EXPECT_FALSE(run.frames[5].flags & OdometryResult::kDegenerate);
-    const Eigen::Vector3d error = last.truth.rotation() * run.relative_error(0, 49).translation();
+    const Eigen::Vector3d error = last.truth.rotation() * run.relative_error(0, 54).translation();
     EXPECT_LT(error.tail<2>().norm(), 0.03);
     // Along the tunnel only the IMU speaks: it drifts slowly, and the covariance says so.
     EXPECT_LT(std::abs(error.x()), 0.5);

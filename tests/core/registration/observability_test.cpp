@@ -150,8 +150,8 @@ TEST(Observability, MoreCanBeDemandedOfTheFewMatchesThatFaceADirection) {
     });
     NormalEquations equations;
     accumulate(matches, equations);
-    EXPECT_EQ(Observability::of(matches, equations, 1.5).unobservable(), 0);
-    EXPECT_EQ(Observability::of(matches, equations, 3.0).unobservable(), 1);
+    EXPECT_EQ(Observability::of(matches, equations, 5.0).unobservable(), 0);
+    EXPECT_EQ(Observability::of(matches, equations, 7.0).unobservable(), 1);
 }
 
 TEST(Observability, NoMatchesDetermineNothing) {
