@@ -1,6 +1,7 @@
 // Registration of a frame in two stages, with the motion over its sweep.
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "core/map/keyframe_cloud.hpp"
 #include "core/odometry/odometry_state.hpp"
@@ -16,8 +17,18 @@ constexpr std::size_t kMinMatches = 60;
 constexpr double kMinMatchedShare = 0.1;
 constexpr double kMinNearShare = 0.5;
 constexpr double kNear_m = 0.1;
-constexpr int kBootstrapPasses = 5;
+// Beyond this distance a match speaks against the motion that it was found with.
+constexpr double kFit_m = 0.05;
+constexpr int kBootstrapPasses = 4;
 constexpr int kBootstrapIterations = 10;
+// A robot that stands, or nearly, sees so much of its first scan again.
+constexpr double kSameViewShare = 0.85;
+// What a robot may be at when it is switched on: velocities to begin with, in eight directions of the horizontal plane.
+constexpr double kFirstSpeeds_mps[] = {5.0, 10.0, 15.0};
+constexpr int kFirstDirections = 8;
+constexpr int kTrialPasses = 2;
+constexpr int kTrialIterations = 4;
+constexpr double kClearlyBetterFit = 1.02;
 // Gates open as the prediction's standard deviation grows beyond this.
 constexpr double kSureDeviation_m = 0.1;
 constexpr double kMaxWidening = 3.0;
@@ -79,42 +90,85 @@ std::size_t Odometry::State::taking_part(const PointSelection& points) {
 /// The first scan could not be deskewed for its motion: now that the second one tells it, do both again. What counts is
 /// the way from one pose to the other; two scans that are skewed alike would fit at any velocity.
 void Odometry::State::bootstrap(const Frame& frame) {
+    const MotionFilter unmoved = first_filter;
+    register_frame(frame, kBootstrapIterations, 1.0);
+    is_trustworthy();
+    const bool same_view = static_cast<double>(near) >= kSameViewShare * static_cast<double>(candidates);
+    first_filter = same_view ? unmoved : likeliest_start(frame, unmoved);
+    begin_again(frame);
+    settle(frame, kBootstrapPasses, kBootstrapIterations);
+    register_frame(frame, kBootstrapIterations, 1.0);
+}
+
+/// The robot may be fast already: beyond a metre or so between two scans, the registration finds the nearest of what
+/// looks alike. Of the ways that it finds from several velocities the one counts that explains most of the scan; a
+/// faster one has to explain clearly more.
+MotionFilter Odometry::State::likeliest_start(const Frame& frame, const MotionFilter& unmoved) {
+    const std::uint32_t flags_before = flags;  // what is seen from a wrong velocity is not said of the frame
+    MotionFilter best = unmoved;
+    double best_fit = 0.0;
+    const auto try_velocity = [&](const Eigen::Vector3d& velocity_mps) {
+        first_filter = unmoved;
+        first_filter.forget_velocity();
+        first_filter.set_motion(velocity_mps, unmoved.state().rate_radps);
+        begin_again(frame);
+        settle(frame, kTrialPasses, kTrialIterations);
+        // One motion has to explain both the way between the scans and the skew of each.
+        scan_to_submap.match(frame.prepared.points, excluded, placed, keyframes.submap(), origin, 1.0, matches);
+        if (const double now = fit(); now > kClearlyBetterFit * best_fit) {
+            best_fit = now;
+            best = first_filter;
+        }
+    };
+    try_velocity(unmoved.state().velocity_mps);
+    for (const double speed_mps : kFirstSpeeds_mps) {
+        for (int direction = 0; direction < kFirstDirections; ++direction) {
+            const double heading = 2.0 * std::numbers::pi * direction / kFirstDirections;
+            try_velocity(unmoved.state().rotation *
+                         Eigen::Vector3d(speed_mps * std::cos(heading), speed_mps * std::sin(heading), 0.0));
+        }
+    }
+    flags = flags_before;
+    return best;
+}
+
+/// Registers the scan and deskews the first one for the motion that this gives, so many times.
+void Odometry::State::settle(const Frame& frame, int passes, int iterations_a_pass) {
     const double dt = static_cast<double>(frame.header.stamp_ns - first_filter.stamp_ns()) * 1e-9;
-    for (int pass = 0; pass < kBootstrapPasses; ++pass) {
-        register_frame(frame, kBootstrapIterations, 1.0);
-        if (pass == 0) register_widely(frame);
-        if (pass + 1 == kBootstrapPasses || matches.count < kMinMatches) break;
+    for (int pass = 0; pass < passes; ++pass) {
+        register_frame(frame, iterations_a_pass, 1.0);
+        if (matches.count < kMinMatches) return;
         const MotionFilter::Vector correction = filter.correction();
-        MotionFilter again = first_filter;
-        again.set_motion(again.state().velocity_mps + correction.segment<3>(0) / dt,
-                         filter.uses_imu()
-                             ? again.state().rate_radps
-                             : Eigen::Vector3d(again.state().rate_radps +
-                                               again.state().rotation.conjugate() * correction.segment<3>(3) / dt));
-        again.sweep(first_duration_s, origin_m, motion);
-        place(first_points, motion, placed);
-        place_provisional();
-        place_target(first_points, {}, again.T_world_sensor());
-        first_filter = again;
-        filter = again;
-        filter.predict(frame.header.stamp_ns);
-        update_sweep(frame);
+        const MotionState& first = first_filter.state();
+        Eigen::Vector3d rate = first.rate_radps;
+        if (!filter.uses_imu()) rate += first.rotation.conjugate() * correction.segment<3>(3) / dt;
+        first_filter.set_motion(first.velocity_mps + correction.segment<3>(0) / dt, rate);
+        begin_again(frame);
     }
 }
 
-/// Once more with open gates, for a robot that is already fast; that is kept if it explains clearly more of the scan.
-void Odometry::State::register_widely(const Frame& frame) {
-    is_trustworthy();
-    const auto narrow_near = static_cast<double>(near);
-    const MotionFilter narrow = filter;
-    filter.discard_update();
+/// What speaks for a motion over the ground, less what speaks against it: matches on their planes count for it, those
+/// off them against it. The ground itself says nothing: its rings look the same from everywhere.
+double Odometry::State::fit() const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < matches.count; ++i) {
+        const auto nx = static_cast<double>(matches.h[0][i]);
+        const auto ny = static_cast<double>(matches.h[1][i]);
+        const double r = static_cast<double>(matches.residual[i]) / kFit_m;
+        sum += (nx * nx + ny * ny) * std::max(-1.0, 1.0 - r * r);
+    }
+    return sum;
+}
+
+/// Back to the first scan, with the motion that is now believed of it; then the prediction for the present one.
+void Odometry::State::begin_again(const Frame& frame) {
+    first_filter.sweep(first_duration_s, origin_m, motion);
+    place(first_points, motion, placed);
+    place_provisional();
+    place_target(first_points, {}, first_filter.T_world_sensor());
+    filter = first_filter;
+    filter.predict(frame.header.stamp_ns);
     update_sweep(frame);
-    register_frame(frame, kBootstrapIterations, kMaxWidening);
-    is_trustworthy();
-    if (static_cast<double>(near) > kClearlyBetter * narrow_near) return;
-    filter = narrow;
-    update_sweep(frame);
-    scan_to_submap.match(frame.prepared.points, excluded, placed, keyframes.submap(), origin, 1.0, matches);
 }
 
 /// Makes the placed points, of the first scan, the submap until there are keyframes.

@@ -17,6 +17,7 @@ constexpr int kGravity = 15;
 
 constexpr double kPredictionStep_s = 2.5e-3;
 constexpr double kCovarianceStep_s = 0.1;
+constexpr double kUnknownVelocity_mps = 3.0;  // standard deviation at the start
 // Variance of a block that the present mode does not know: so small that it stays what it is.
 constexpr double kFrozen = 1e-12;
 // A body at rest: how well its velocity is zero, and beyond how many standard deviations it is not believed to be.
@@ -46,7 +47,7 @@ void MotionFilter::initialize(const Eigen::Isometry3d& T_world_sensor, const Eig
     };
     set(kPosition, 1e-4);
     set(kRotation, 1e-4);
-    set(kVelocity, 3.0);
+    set(kVelocity, kUnknownVelocity_mps);
     imu_ = nullptr;
     use_imu(imu);
 }
@@ -251,6 +252,12 @@ void MotionFilter::apply(MotionState& s, const Vector& error) {
     s.rate_radps += error.segment<3>(kRate);
     s.accelerometer_bias_mps2 += error.segment<3>(kAccelerometerBias);
     s.gravity_mps2 += error.segment<3>(kGravity);
+}
+
+void MotionFilter::forget_velocity() {
+    covariance_.middleRows<3>(kVelocity).setZero();
+    covariance_.middleCols<3>(kVelocity).setZero();
+    covariance_.diagonal().segment<3>(kVelocity).setConstant(kUnknownVelocity_mps * kUnknownVelocity_mps);
 }
 
 void MotionFilter::set_motion(const Eigen::Vector3d& velocity_mps, const Eigen::Vector3d& rate_radps) {

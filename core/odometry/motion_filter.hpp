@@ -100,6 +100,8 @@ class MotionFilter {
     const Vector& prior_deviation() const { return prior_deviation_; }
 
     const MotionState& state() const { return state_; }
+    /// Whatever is believed of the velocity counts no more.
+    void forget_velocity();
     /// Replaces velocity and rate, with their uncertainty as it is.
     void set_motion(const Eigen::Vector3d& velocity_mps, const Eigen::Vector3d& rate_radps);
     void set_gravity(const Eigen::Vector3d& gravity_mps2) { state_.gravity_mps2 = gravity_mps2; }

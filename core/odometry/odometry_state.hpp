@@ -42,7 +42,10 @@ struct Odometry::State {
     void use_constant_velocity();
     void bootstrap(const Frame& frame);
     void register_frame(const Frame& frame, int first_stage_iterations, double widening);
-    void register_widely(const Frame& frame);
+    MotionFilter likeliest_start(const Frame& frame, const MotionFilter& unmoved);
+    void settle(const Frame& frame, int passes, int iterations_a_pass);
+    void begin_again(const Frame& frame);
+    double fit() const;
     void place_provisional();
     bool is_trustworthy();
     void choose_origin();

@@ -98,6 +98,22 @@ TEST_P(MovingStart, FindsItsVelocityFromTheSecondFrameOn) {
     EXPECT_NEAR(run.frames[2].linear_velocity.norm(), 3.0, 0.1);
 }
 
+TEST_P(MovingStart, FindsSixMetresASecondToo) {
+    for (const double heading : {0.0, 2.0}) {
+        SCOPED_TRACE(heading);
+        SimulatedDrive drive(furnished_room(), [&](double t) {
+            const double s = 6.0 * t - 3.0;
+            return pose_of(s * std::cos(heading), s * std::sin(heading), 0.0, 0.2);
+        });
+        OdometryConfig config;
+        config.use_imu = GetParam();
+        OdometryRun run(drive, config);
+        run.run(0, 8);
+        EXPECT_LT(run.largest_position_error(), 0.08);
+        EXPECT_NEAR(run.frames[2].linear_velocity.norm(), 6.0, 0.2);
+    }
+}
+
 INSTANTIATE_TEST_SUITE_P(Odometry, MovingStart, testing::Bool());
 
 TEST(Odometry, SurvivesTurnsOfFiveRadiansASecond) {
