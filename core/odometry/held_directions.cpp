@@ -9,7 +9,7 @@ struct Return {
     double demand;
     int frames;
 };
-constexpr Return kWithImu{9.0, 5};
+constexpr Return kWithImu{3.0, 3};
 constexpr Return kWithoutImu{6.0, 3};
 
 }  // namespace

@@ -11,7 +11,7 @@ namespace dlod {
 class HeldDirections {
   public:
     /// Judges the matches of a stage's first iteration.
-    /// @param with_imu the prediction is good for some seconds: there is no hurry to take a direction back
+    /// @param with_imu the prediction stays good enough that what moves does not match: less has to face a direction
     void judge(const PlaneMatches& matches, const NormalEquations& equations, bool with_imu);
     /// The last judgement.
     const Observability& observability() const { return observability_; }
