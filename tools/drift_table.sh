@@ -7,26 +7,8 @@
 #   --keep    where the drives stay, to be used again; else they go when their scores are known
 # Needs a build in build/, or in the folder that BUILD_DIR names.
 set -euo pipefail
-here=$(cd "$(dirname "$0")" && pwd)
-build=${BUILD_DIR:-$here/../build}
 sensor=OS0-128 mode=1024x10 seeds=5 duration=20 scenes='square corridor' speeds='0 1 2 5' keep=''
-while [[ $# -gt 0 ]]; do
-    case $1 in
-        --sensor) sensor=$2 ;;
-        --mode) mode=$2 ;;
-        --seeds) seeds=$2 ;;
-        --duration) duration=$2 ;;
-        --scenes) scenes=$2 ;;
-        --speeds) speeds=$2 ;;
-        --keep) keep=$2 ;;
-        *) sed -n '2,8s/^# \{0,1\}//p' "$0"; exit 2 ;;
-    esac
-    shift 2
-done
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-drives=${keep:-$work}
-mkdir -p "$drives"
+. "$(dirname "$0")/simulated_drives.sh" "sensor mode seeds duration scenes speeds keep" "$@"
 
 # "drift or largest error, percent valid" of one replay
 score() {  # DRIVE SPEED USE_IMU
@@ -47,10 +29,10 @@ for scene in $scenes; do
     for speed in $speeds; do
         for ((seed = 1; seed <= seeds; ++seed)); do
             name=${scene}_${speed}_$seed
-            [[ -e $drives/$name.json ]] || "$build/tools/sim/dlod-sim" "$scene" --sensor "$sensor" --mode "$mode" \
-                --seed "$seed" --speed "$speed" --duration "$duration" --out "$drives" --name "$name" >/dev/null
+            make_drive "$name" "$scene" --sensor "$sensor" --mode "$mode" --seed "$seed" --speed "$speed" \
+                --duration "$duration"
             for imu in true false; do score "$drives/$name" "$speed" "$imu" >>"$work/${scene}_${speed}_$imu"; done
-            [[ -n $keep ]] || rm -rf "${drives:?}/$name"*
+            drop_drive "$name"
         done
         printf '| %s | %s m/s |' "$scene" "$speed"
         for imu in true false; do

@@ -6,23 +6,8 @@
 # The street is driven at 5 m/s, the robot of the circle stands, all others walk at 1 m/s.
 # Needs a build in build/, or in the folder that BUILD_DIR names.
 set -euo pipefail
-here=$(cd "$(dirname "$0")" && pwd)
-build=${BUILD_DIR:-$here/../build}
 seeds=5 frames=100 scenes='square corridor street circle slope' keep=''
-while [[ $# -gt 0 ]]; do
-    case $1 in
-        --seeds) seeds=$2 ;;
-        --frames) frames=$2 ;;
-        --scenes) scenes=$2 ;;
-        --keep) keep=$2 ;;
-        *) sed -n '2,8s/^# \{0,1\}//p' "$0"; exit 2 ;;
-    esac
-    shift 2
-done
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-drives=${keep:-$work}
-mkdir -p "$drives"
+. "$(dirname "$0")/simulated_drives.sh" "seeds frames scenes keep" "$@"
 
 # The metrics in the order of the columns; a minus: the largest is the worst.
 metrics='iou precision recall mota idf1 -id_switches -delay_frames_median -delay_frames_p90 -ghost_pct kept_pct'
@@ -61,10 +46,9 @@ for scene in $scenes; do
     case $scene in street) speed=5 ;; circle) speed=0 ;; *) speed=1 ;; esac
     for ((seed = 1; seed <= seeds; ++seed)); do
         name=$scene$seed
-        [[ -e $drives/$name.json ]] || "$build/tools/sim/dlod-sim" "$scene" --seed "$seed" --speed "$speed" \
-            --frames "$frames" --out "$drives" --name "$name" >/dev/null
+        make_drive "$name" "$scene" --seed "$seed" --speed "$speed" --frames "$frames"
         score "$drives/$name" "$scene"
-        [[ -n $keep ]] || rm -rf "${drives:?}/$name"*
+        drop_drive "$name"
     done
     row "$scene" <"$work/$scene"
     cat "$work/$scene" >>"$work/all"

@@ -88,19 +88,11 @@ OrientedBox box_of_pieces(const Track& track) {
     return box;
 }
 
-/// Marks the points that lie in a box, given as centre, half sizes and direction of its length.
+/// Marks the points that lie in a box.
 DLOD_MULTIVERSION
 void mark_inside(std::size_t count, const float* __restrict x, const float* __restrict y, const float* __restrict z,
-                 const float* __restrict center, const float* __restrict half, float cosine, float sine,
-                 std::uint8_t* __restrict inside) {
-    const float cx = center[0], cy = center[1], cz = center[2];
-    const float hx = half[0], hy = half[1], hz = half[2];
-    for (std::size_t i = 0; i < count; ++i) {
-        const float dx = x[i] - cx, dy = y[i] - cy, dz = z[i] - cz;
-        const bool along = std::abs(cosine * dx + sine * dy) <= hx;
-        const bool across = std::abs(cosine * dy - sine * dx) <= hy;
-        inside[i] |= static_cast<std::uint8_t>(along & across & (std::abs(dz) <= hz));
-    }
+                 const PreparedBox box, std::uint8_t* __restrict inside) {
+    for (std::size_t i = 0; i < count; ++i) inside[i] |= static_cast<std::uint8_t>(box.contains(x[i], y[i], z[i]));
 }
 
 }  // namespace
@@ -208,12 +200,9 @@ void GlobalMap::State::leave_out_pieces(const std::vector<Track>& tracks, MapPoi
     bool any = false;
     for (const Track& track : tracks) {
         if (!is_seen_in_pieces(track)) continue;
-        const OrientedBox box = box_of_pieces(track);
         if (!any) inside.assign(points.size(), 0);
         any = true;
-        const Eigen::Vector3f center = box.center_m.cast<float>(), half = (0.5 * box.size_m).cast<float>();
-        mark_inside(points.size(), points.x.data(), points.y.data(), points.z.data(), center.data(), half.data(),
-                    static_cast<float>(std::cos(box.yaw_rad)), static_cast<float>(std::sin(box.yaw_rad)),
+        mark_inside(points.size(), points.x.data(), points.y.data(), points.z.data(), PreparedBox(box_of_pieces(track)),
                     inside.data());
     }
     if (!any) return;

@@ -5,12 +5,10 @@
 namespace dlod {
 namespace {
 
-struct Return {
-    double demand;
-    int frames;
-};
-constexpr Return kWithImu{3.0, 3};
-constexpr Return kWithoutImu{6.0, 3};
+// What it takes to take a direction back: so many times what would have kept it, in so many frames on end.
+constexpr double kDemandWithImu = 3.0;
+constexpr double kDemandWithoutImu = 6.0;
+constexpr int kFrames = 3;
 
 }  // namespace
 
@@ -20,10 +18,10 @@ void HeldDirections::begin_frame() {
 }
 
 void HeldDirections::judge(const PlaneMatches& matches, const NormalEquations& equations, bool with_imu) {
-    const Return needed = with_imu ? kWithImu : kWithoutImu;
-    observability_ = Observability::of(matches, equations, adrift_ ? needed.demand : 1.0);
+    const double demand = with_imu ? kDemandWithImu : kDemandWithoutImu;
+    observability_ = Observability::of(matches, equations, adrift_ ? demand : 1.0);
     shows_all_ = observability_.unobservable() == 0;
-    if (adrift_ && frames_showing_all_ < needed.frames) {
+    if (adrift_ && frames_showing_all_ < kFrames) {
         observability_ = Observability::of(matches, equations, std::numeric_limits<double>::infinity());
     }
 }

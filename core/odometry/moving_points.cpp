@@ -22,31 +22,22 @@ void MovingPoints::mark(const PlacedPoints& placed, const Eigen::Vector3d& origi
     const double age = static_cast<double>(stamp_ns - stamp_ns_) * 1e-9;
     if (boxes_.empty() || age < 0.0 || age > kMaxAge_s) return;
     struct Local {
-        float center[3], cosine, sine, half[3], reach2;
+        PreparedBox box;
+        float reach2 = 0.0F;
     };
     std::array<Local, kMaxBoxes> local;
     for (std::size_t b = 0; b < boxes_.size(); ++b) {
-        const OrientedBox& box = boxes_[b].box;
-        const Eigen::Vector3d center = box.center_m + age * boxes_[b].velocity_mps - origin_m;
-        float reach2 = 0.0F;
-        for (int i = 0; i < 3; ++i) {
-            local[b].center[i] = static_cast<float>(center[i]);
-            local[b].half[i] = static_cast<float>(0.5 * box.size_m[i] + kMargin_m);
-            reach2 += local[b].half[i] * local[b].half[i];
-        }
-        local[b].reach2 = reach2;
-        local[b].cosine = static_cast<float>(std::cos(box.yaw_rad));
-        local[b].sine = static_cast<float>(std::sin(box.yaw_rad));
+        OrientedBox box = boxes_[b].box;
+        box.center_m += age * boxes_[b].velocity_mps - origin_m;
+        local[b].box = PreparedBox(box, kMargin_m);
+        for (const float half : local[b].box.half_m) local[b].reach2 += half * half;
     }
     for (std::size_t i = 0; i < excluded.size(); ++i) {
+        const float x = placed.x[i], y = placed.y[i], z = placed.z[i];
         for (std::size_t b = 0; b < boxes_.size(); ++b) {
-            const Local& box = local[b];
-            const float dx = placed.x[i] - box.center[0];
-            const float dy = placed.y[i] - box.center[1];
-            const float dz = placed.z[i] - box.center[2];
-            if (dx * dx + dy * dy + dz * dz > box.reach2) continue;
-            if (std::abs(box.cosine * dx + box.sine * dy) <= box.half[0] &&
-                std::abs(-box.sine * dx + box.cosine * dy) <= box.half[1] && std::abs(dz) <= box.half[2]) {
+            const auto& [box, reach2] = local[b];
+            const float dx = x - box.center_m[0], dy = y - box.center_m[1], dz = z - box.center_m[2];
+            if (dx * dx + dy * dy + dz * dz <= reach2 && box.contains(x, y, z)) {
                 excluded[i] = 1;
                 break;
             }

@@ -7,6 +7,8 @@ namespace {
 constexpr std::size_t kMinFirstPoints = 100;
 // With fewer matches near their planes than this share of the usual the IMU is suspected.
 constexpr double kPoorShare = 0.6;
+// Of two registrations one is better with so many times more matches near their planes.
+constexpr double kClearlyBetter = 1.2;
 constexpr double kNearSmoothing = 0.2;
 // After so long without a registration the map is given up.
 constexpr double kLost_s = 2.0;

@@ -27,8 +27,6 @@ struct Odometry::State {
 
   private:
     static constexpr double kMaxSweep_s = 0.5;
-    /// Of two registrations one is better with so many times more matches near their planes.
-    static constexpr double kClearlyBetter = 1.2;
 
     void apply(const OdometryFeedback& feedback);
     void start(const Frame& frame, const Eigen::Isometry3d& T_world_sensor);

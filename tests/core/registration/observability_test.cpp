@@ -60,6 +60,18 @@ Surface passage(double u, double v) {
     return {{along, 1.5, 4.0 * v - 3.0}, {0, -1, 0}};
 }
 
+/// 3000 points of a passage, of which the first thirty lie on a wall at its end.
+PlaneMatches matches_of_passage_with_end_wall() {
+    int wall = 0;
+    return matches_of(3000, [&](double u, double v) {
+        if (wall < 30) {
+            ++wall;
+            return Surface{{15.0, 1.4 * u, 1.2 * v}, {-1, 0, 0}};
+        }
+        return passage(u, v);
+    });
+}
+
 TEST(Observability, AnOpenPlaneFixesHeightAndLevelOnly) {
     auto matches = matches_of(2000, ground);
     const Observability o = look(matches);
@@ -107,26 +119,12 @@ TEST(Observability, ARoomHidesNothing) {
 }
 
 TEST(Observability, AFewDozenPointsOfAnEndWallAreEvidence) {
-    int wall = 0;
-    auto matches = matches_of(3000, [&](double u, double v) {
-        if (wall < 30) {
-            ++wall;
-            return Surface{{15.0, 1.4 * u, 1.2 * v}, {-1, 0, 0}};
-        }
-        return passage(u, v);
-    });
+    auto matches = matches_of_passage_with_end_wall();
     EXPECT_EQ(look(matches).unobservable(), 0);
 }
 
 TEST(Observability, AFewFacingMatchesAreHeardWithoutTheNoiseOfTheOthers) {
-    int wall = 0;
-    auto matches = matches_of(3000, [&](double u, double v) {
-        if (wall < 30) {
-            ++wall;
-            return Surface{{15.0, 1.4 * u, 1.2 * v}, {-1, 0, 0}};
-        }
-        return passage(u, v);
-    });
+    auto matches = matches_of_passage_with_end_wall();
     const Observability o = look(matches);
     ASSERT_EQ(o.unobservable(), 0);
     NormalEquations before;
@@ -140,14 +138,7 @@ TEST(Observability, AFewFacingMatchesAreHeardWithoutTheNoiseOfTheOthers) {
 }
 
 TEST(Observability, MoreCanBeDemandedOfTheFewMatchesThatFaceADirection) {
-    int wall = 0;
-    auto matches = matches_of(3000, [&](double u, double v) {
-        if (wall < 30) {
-            ++wall;
-            return Surface{{15.0, 1.4 * u, 1.2 * v}, {-1, 0, 0}};
-        }
-        return passage(u, v);
-    });
+    auto matches = matches_of_passage_with_end_wall();
     NormalEquations equations;
     accumulate(matches, equations);
     EXPECT_EQ(Observability::of(matches, equations, 5.0).unobservable(), 0);
