@@ -18,7 +18,8 @@ constexpr std::size_t kBufferBytes = 64 * 1024;
 }
 
 std::filesystem::path path_to_write(const std::filesystem::path& target, OutputFile::Mode mode) {
-    return mode == OutputFile::Mode::kInPlace ? target : std::filesystem::path(target.string() + ".part");
+    return mode == OutputFile::Mode::kInPlace ? target
+                                              : std::filesystem::path(target.string() + OutputFile::kPartSuffix);
 }
 
 }  // namespace

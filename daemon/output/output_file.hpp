@@ -24,6 +24,8 @@ class OutputFile {
         /// close() it stays for good.
         kReplace,
     };
+    /// Of the name under which a file waits that will replace another.
+    static constexpr const char* kPartSuffix = ".part";
 
     /// Creates or truncates. @throws OutputError
     explicit OutputFile(std::filesystem::path path, Mode mode = Mode::kInPlace);
