@@ -41,6 +41,7 @@ void Odometry::State::write_result(Frame& frame) {
                              out.residual_m, &frame.prepared.ground);
     out.residual_cap_m = static_cast<float>(config.scan_to_submap.residual_cap_m);
     // A first scan has been deskewed without its velocity: it is no keyframe.
+    out.void_scan_ns = void_scan_ns;
     out.keyframe =
         registered && !bootstrapping && keyframes.is_due(out.T_world_sensor, median_range(frame.prepared.points));
     if (out.keyframe) keyframes.announce(out.T_world_sensor, out.covariance);
@@ -65,6 +66,7 @@ void Odometry::State::write_nothing(Frame& frame) const {
     out.gravity_mps2 = filter.state().gravity_mps2;
     out.valid = false;
     out.keyframe = false;
+    out.void_scan_ns.reset();
     out.flags = OdometryResult::kPredictedOnly;
     out.iterations = 0;
     out.correspondences = 0;

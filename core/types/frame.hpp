@@ -14,6 +14,7 @@
 #include <Eigen/Geometry>
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace dlod {
@@ -90,6 +91,8 @@ struct OdometryResult {
     /// Good enough for seeing what moves: valid, or else registered with the local map but adrift along a direction in
     /// which nothing is to be seen.
     bool follows_map() const { return valid || (flags & (kDegenerate | kPredictedOnly)) == kDegenerate; }
+    /// What earlier frames saw does not fit this one: a new map, or one whose first scan is void.
+    bool earlier_is_void() const { return (flags & kReinitialized) != 0 || void_scan_ns.has_value(); }
     Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();  ///< at the frame's stamp
     Eigen::Vector3d linear_velocity_mps = Eigen::Vector3d::Zero();     ///< sensor frame
     Eigen::Vector3d angular_velocity_radps = Eigen::Vector3d::Zero();  ///< sensor frame
@@ -98,6 +101,9 @@ struct OdometryResult {
     int iterations = 0;
     int correspondences = 0;
     bool keyframe = false;          ///< becomes a keyframe once its moving points have been removed
+    /// Stamp of the scan that the map began with, where it turns out to have been deskewed for another motion than it
+    /// had: nothing that was learnt from it holds.
+    std::optional<std::int64_t> void_scan_ns;
     /// Residuals of the scan-to-submap registration: distance of each registered point to its counterpart.
     AlignedVector<PixelIndex> residual_pixel;
     AlignedVector<float> residual_m;
