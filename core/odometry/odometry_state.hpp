@@ -55,6 +55,7 @@ struct Odometry::State {
     void see_turn(std::int64_t stamp_ns);
     void update_anchor(const Eigen::Vector3d& position_m);
     void write_result(Frame& frame);
+    void write_keyframe_points(Frame& frame) const;
     void write_nothing(Frame& frame) const;
     Eigen::Vector3d mean_force(const Frame& frame) const;
     double median_range(const PointSelection& points);

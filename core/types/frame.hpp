@@ -13,6 +13,7 @@
 
 #include <Eigen/Geometry>
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -59,11 +60,12 @@ struct PointSelection {
     AlignedVector<float> nx, ny, nz;  ///< unit normal towards the sensor, from the range-image window; 0, 0, 0: unknown
     AlignedVector<float> planarity;   ///< weight in the registration: 1 flat .. 0 no part in it
     AlignedVector<float> time_s;      ///< firing time relative to the frame's stamp, at most 0
+    AlignedVector<float> tx, ty, tz;  ///< gradient of that time over the window that the normal is from, s/m
     std::size_t size() const { return pixel.size(); }
     void clear() {
         pixel.clear();
         measurement.clear();
-        for (auto* v : {&x, &y, &z, &nx, &ny, &nz, &planarity, &time_s}) v->clear();
+        for (auto* v : {&x, &y, &z, &nx, &ny, &nz, &planarity, &time_s, &tx, &ty, &tz}) v->clear();
     }
 };
 
@@ -110,6 +112,8 @@ struct OdometryResult {
     float residual_cap_m = 0.0F;    ///< what residual_m says where nothing of the submap is near
     /// Rows of T_stamp_column by measurement: turns a point of StructuredCloud into the sensor frame at the stamp.
     AlignedVector<float> deskew[12];  ///< row-major 3 x 4, each [W]
+    /// Of a keyframe: position and normal (x, y, z, nx, ny, nz) of Preparation::points, deskewed, sensor frame at the stamp.
+    std::array<AlignedVector<float>, 6> keyframe_points;
     /// The deskewed cloud: sensor frame at the stamp; 0, 0, 0 where there is no return.
     Image<float> x, y, z;
 };
