@@ -97,4 +97,24 @@ double footprint_distance_m(const OrientedBox& box, const Eigen::Vector3d& point
     return std::hypot(u, v);
 }
 
+Eigen::Vector2d joint_size(const OrientedBox& a, const OrientedBox& b, double yaw_rad) {
+    const Eigen::Vector2d along(std::cos(yaw_rad), std::sin(yaw_rad));
+    const Eigen::Vector2d across(-along.y(), along.x());
+    const auto half = [](const OrientedBox& box, const Eigen::Vector2d& axis) {
+        const double c = std::cos(box.yaw_rad), s = std::sin(box.yaw_rad);
+        return 0.5 * (std::abs(axis.x() * c + axis.y() * s) * box.size_m.x() +
+                      std::abs(axis.y() * c - axis.x() * s) * box.size_m.y());
+    };
+    const auto reach = [&](const Eigen::Vector2d& axis) {
+        const double at = axis.dot((b.center_m - a.center_m).head<2>());
+        return std::max(half(a, axis), at + half(b, axis)) - std::min(-half(a, axis), at - half(b, axis));
+    };
+    return {reach(along), reach(across)};
+}
+
+double share_inside(const OrientedBox& part, OrientedBox box, double margin_m) {
+    box.size_m.head<2>().array() += 2.0 * margin_m;
+    return footprint_intersection_m2(part, box) / (part.size_m.x() * part.size_m.y());
+}
+
 }  // namespace dlod

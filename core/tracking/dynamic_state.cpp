@@ -15,6 +15,7 @@ constexpr double kTall_m = 0.4;           // detections of that height count in 
 constexpr double kMostUnconfirmed = 0.6;  // of what makes an object dynamic, without free space
 // What walks away hides the space that it enters: nobody can have seen it free, and its old places look occupied.
 constexpr double kSustained = 0.7;    // least trust in a displacement that agrees with the track's velocity for a while
+constexpr double kWalked = 1.5;       // log-odds of a way longer than the object
 constexpr double kUnconfirmed = 0.3;  // trust in a displacement where no free space was tested
 constexpr double kMaxLogOdds = 8.0;   // bounds keep a belief reversible
 constexpr double kMaxStep = 2.4;      // one frame alone never decides
@@ -26,6 +27,12 @@ constexpr double kOutOfSight_s = 0.45;  // what is found after longer may be som
 constexpr int kFewFree = 3;             // one tested point in so many lies in free space of what surely moves
 
 }  // namespace
+
+void MotionCues::take_walked_way() {
+    displacement_log_odds = std::max(displacement_log_odds, kWalked);
+    sustained_displacement = true;
+    left_its_place = true;
+}
 
 double free_share(const MotionCues& cues) {
     const int tested = cues.free_points + cues.occupied_points;

@@ -24,6 +24,9 @@ struct MotionCues {
     bool left_its_place = false;          ///< and is longer than that what it hides could feign
     Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< filtered centre, ground plane
     double dt_s = 0.0;                                     ///< since the detection before
+
+    /// It has gone farther than it is large: as good as any registration.
+    void take_walked_way();
 };
 
 /// Share of the tested points that lie where free space was seen; negative where too few were tested to tell.

@@ -19,6 +19,9 @@ constexpr double kLongest_m = 25.0;
 constexpr double kVehicleLength_m = 4.0;   // of the smaller cars
 constexpr double kVehicleWidth_m = 1.4;    // what is as wide as that
 constexpr double kVehicleSpeed_mps = 3.0;  // and as fast is neither a person nor two side by side
+constexpr double kHeavyLength_m = 9.0;     // lorries and buses are 6 to 12 m long,
+constexpr double kHeavyWidth_m = 2.3;      // wider than cars and vans,
+constexpr double kHeavyHeight_m = 2.5;     // and taller
 
 /// Which ends of an axis of the box are hidden.
 struct HiddenEnds {
@@ -132,12 +135,20 @@ ExtentMeasurement complete_extent(const OrientedBox& visible, const Eigen::Vecto
     return out;
 }
 
-Growth assumed_growth(const OrientedBox& box, double visible_width_m, double speed_mps, const Visibility& visibility) {
+Growth assumed_growth(const OrientedBox& box, const Eigen::Vector3d& visible_m, double speed_mps,
+                      const Visibility& visibility) {
     const Eigen::Vector2d along(std::cos(box.yaw_rad), std::sin(box.yaw_rad));
     const Eigen::Vector2d across(-along.y(), along.x());
     const double length = box.size_m.x(), width = box.size_m.y();
-    const bool vehicle = speed_mps > kVehicleSpeed_mps && std::min(width, visible_width_m) > kVehicleWidth_m;
-    const double missing_length = (vehicle ? kVehicleLength_m : std::min(0.5 * width, kCarWidth_m)) - length;
+    const double seen_width = std::min(width, visible_m.y());
+    const bool vehicle = speed_mps > kVehicleSpeed_mps && seen_width > kVehicleWidth_m;
+    // Where its side is seen, that tells its length.
+    const bool heavy = vehicle && seen_width > kHeavyWidth_m && box.size_m.z() > kHeavyHeight_m &&
+                       visible_m.x() < 0.5 * kHeavyLength_m;
+    const double least_length = heavy     ? kHeavyLength_m
+                                : vehicle ? kVehicleLength_m
+                                          : std::min(0.5 * width, kCarWidth_m);
+    const double missing_length = least_length - length;
     const double missing_width = std::min(0.5 * length, kCarWidth_m) - width;
     Growth growth;
     if (missing_length > 0.0) {
@@ -161,6 +172,18 @@ Growth surplus(const OrientedBox& remembered, const OrientedBox& part) {
     const double length = remembered.size_m.x(), width = remembered.size_m.y();
     return {beyond(along.dot(offset), part.size_m.x(), length), beyond(-along.dot(offset), part.size_m.x(), length),
             beyond(across.dot(offset), part.size_m.y(), width), beyond(-across.dot(offset), part.size_m.y(), width)};
+}
+
+Growth enclosing_growth(const OrientedBox& remembered, const OrientedBox& part) {
+    const double turn = part.yaw_rad - remembered.yaw_rad;
+    const double c = std::abs(std::cos(turn)), s = std::abs(std::sin(turn));
+    const Eigen::Vector2d along(std::cos(remembered.yaw_rad), std::sin(remembered.yaw_rad));
+    const Eigen::Vector2d offset = (part.center_m - remembered.center_m).head<2>();
+    const double u = along.dot(offset), v = along.x() * offset.y() - along.y() * offset.x();
+    const double room_u = 0.5 * (remembered.size_m.x() - c * part.size_m.x() - s * part.size_m.y());
+    const double room_v = 0.5 * (remembered.size_m.y() - s * part.size_m.x() - c * part.size_m.y());
+    return {std::max(0.0, u - room_u), std::max(0.0, -u - room_u), std::max(0.0, v - room_v),
+            std::max(0.0, -v - room_v)};
 }
 
 OrientedBox assumed_box(const OrientedBox& visible, const Visibility& visibility) {

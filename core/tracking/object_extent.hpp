@@ -36,14 +36,18 @@ ExtentMeasurement complete_extent(const OrientedBox& visible, const Eigen::Vecto
 
 /// What is missing from a moving object that has been seen from one side only, at the ends that hide: nothing is flat,
 /// and what is as wide and as fast as a vehicle is as long as one.
-/// @param visible_width_m across the box's yaw, of the last sighting
+/// @param visible_m size of what was seen in the last sighting, at the box's yaw
 /// @param speed_mps along the box's yaw
-Growth assumed_growth(const OrientedBox& box, double visible_width_m, double speed_mps, const Visibility& visibility);
+Growth assumed_growth(const OrientedBox& box, const Eigen::Vector3d& visible_m, double speed_mps,
+                      const Visibility& visibility);
 
 /// What of a remembered box lies beyond the part that proved to be the whole object, at each end (negative), where two
 /// objects were taken for one.
 /// @param part at the yaw of `remembered`
 Growth surplus(const OrientedBox& remembered, const OrientedBox& part);
+
+/// How far a part of the object that was not known to be one reaches beyond a remembered box, at each end.
+Growth enclosing_growth(const OrientedBox& remembered, const OrientedBox& part);
 
 /// Size of a new object: as seen, but with a depth that is at least half of its width up to that of a car: what is seen
 /// from one side only is not flat.

@@ -88,6 +88,7 @@ TrackedObject::TrackedObject(std::uint32_t id, const Frame& frame, const Detecti
 void TrackedObject::predict(double dt_s, const TrackingConfig& config) {
     filter_.predict(dt_s, config.filter);
     unseen_s_ += dt_s;
+    lifetime_s_ += dt_s;
     before_.age_s += dt_s;
     since_.age_s += dt_s;
     seen_now_ = false;
@@ -117,7 +118,7 @@ void TrackedObject::assume_extent(const Visibility& visibility) {
     if (belief_.state() != DynamicState::kDynamic || hits_ < kEstablishedHits) return;
     const bool heads_along = filter_.speed() > 4.0 * filter_.velocity_sd();
     const Growth growth =
-        assumed_growth(filter_.box(), visible_.size_m.y(), heads_along ? filter_.speed() : 0.0, visibility);
+        assumed_growth(filter_.box(), visible_.size_m, heads_along ? filter_.speed() : 0.0, visibility);
     filter_.grow(growth.front, growth.back, growth.left, growth.right);
 }
 
@@ -151,6 +152,11 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
         assume_extent(sighting.visibility);
     }
     const double shift_m = visible_shift_m(first_visible_, visible_);
+    const bool whole = sighting.detections.size() == 1 && !sighting.cut && !sighting.apart &&
+                       !sighting.visibility.occluded_left && !sighting.visibility.occluded_right;
+    const bool walked =
+        walked_way_.update({visible_, sighting.visibility.sensor_m.head<2>(), lifetime_s_ - shape.age_s}, whole,
+                           filter_.velocity().head<2>());
     // At the stamp, as the filter's centre.
     visible_.center_m += shape.age_s * filter_.velocity() - filter_.box().center_m;
 
@@ -173,6 +179,7 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
     cues.position_m = filter_.box().center_m.head<2>();
     if (config.state.use_displacement && !clear_without_displacement(cues))
         displacement_cue(frame, sighting, shape.age_s, cues);
+    if (config.state.use_displacement && walked) cues.take_walked_way();
 
     ++hits_;
     misses_ = 0;
@@ -181,6 +188,7 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
     seen_now_ = true;
     residual_m_ = cues.average_residual_m;
     if (belief_.update(cues, config.state)) {
+        was_dynamic_ = true;
         history_.release(cleared);
         cleared.push_back(filter_.box());
         leave_background(sighting.visibility);
@@ -189,6 +197,15 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
         world.center_m += filter_.box().center_m;
         history_.add(world);
     }
+}
+
+bool TrackedObject::goes_before(const TrackedObject& other) const {
+    return was_dynamic_ != other.was_dynamic_ ? was_dynamic_ : hits_ > other.hits_;
+}
+
+void TrackedObject::join(const OrientedBox& part) {
+    const Growth growth = enclosing_growth(filter_.box(), part);
+    filter_.grow(growth.front, growth.back, growth.left, growth.right);
 }
 
 void TrackedObject::leave_background(const Visibility& visibility) {
@@ -274,9 +291,18 @@ void TrackedObject::displacement_cue(const Frame& frame, const Sighting& sightin
     }
 }
 
+bool TrackedObject::is_body() const {
+    const Eigen::Vector3d size = filter_.box().size_m;
+    return hits_ >= kEstablishedHits && size.head<2>().maxCoeff() < std::min(kTwoBodies_m, size.z());
+}
+
+bool TrackedObject::under_way() const {
+    return belief_.state() == DynamicState::kDynamic && filter_.speed() > kDriving_mps &&
+           filter_.speed() > 2.0 * filter_.velocity_sd();
+}
+
 bool TrackedObject::drives() const {
-    return belief_.state() == DynamicState::kDynamic && filter_.box().size_m.head<2>().maxCoeff() > kVehicle_m &&
-           filter_.speed() > kDriving_mps && filter_.speed() > 2.0 * filter_.velocity_sd();
+    return under_way() && filter_.box().size_m.head<2>().maxCoeff() > kVehicle_m;
 }
 
 bool TrackedObject::sets_off() const {

@@ -10,6 +10,7 @@
 #include "core/tracking/expected_sight.hpp"
 #include "core/tracking/object_extent.hpp"
 #include "core/tracking/registered_displacement.hpp"
+#include "core/tracking/walked_way.hpp"
 
 namespace dlod {
 
@@ -39,6 +40,11 @@ class TrackedObject {
     /// gone ages twice
     void miss(Sight sight);
 
+    /// Of two tracks on one object that which was dynamic, and has been seen for longer, is known to others.
+    bool goes_before(const TrackedObject& other) const;
+    /// What had a track of its own is a part of it: it is so much larger.
+    void join(const OrientedBox& part);
+
     bool dead(const TrackingConfig& config) const;
     /// Worth telling others of: seen, or dynamic and not known to be gone.
     bool visible_to_others() const;
@@ -54,6 +60,10 @@ class TrackedObject {
     double velocity_sd() const { return filter_.velocity_sd(); }
     /// It is as large as a vehicle, and under way.
     bool drives() const;
+    /// It is known to be as small as people are, and as tall.
+    bool is_body() const;
+    /// It moves, as fast as people walk at least.
+    bool under_way() const;
     /// As large as a vehicle, it was at rest and clearly is no longer, though it does not count as dynamic yet.
     bool sets_off() const;
     bool seen() const { return seen_now_; }  ///< in this frame
@@ -87,6 +97,9 @@ class TrackedObject {
     Eigen::Vector2d before_center_m_ = Eigen::Vector2d::Zero(), since_center_m_ = Eigen::Vector2d::Zero();
     Eigen::Vector2d registered_velocity_mps_ = Eigen::Vector2d::Zero();  ///< by the last registration, 0 if not clear
     int agreeing_ = 0;  ///< frames in a row in which it agreed with the filter's or that of the frame before
+    WalkedWay walked_way_;
+    double lifetime_s_ = 0.0;
+    bool was_dynamic_ = false;
     double unseen_s_ = 0.0;
     double residual_m_ = 0.0;
     int points_ = 0;  ///< of the last sighting

@@ -9,6 +9,7 @@
 #include "core/tracking/detection_shapes.hpp"
 #include "core/tracking/merged_detections.hpp"
 #include "core/tracking/tracked_object.hpp"
+#include "core/tracking/vehicle_parts.hpp"
 
 namespace dlod {
 
@@ -24,10 +25,8 @@ constexpr double kLeastBody = 0.6;         // of the height of the object beside
 constexpr double kInside = 0.6;            // of its footprint lies inside of those margins
 constexpr double kInsideVehicle = 0.8;     // or of a moving vehicle's box itself
 constexpr double kSimilar = 1.5;           // ratio of footprint diagonals
-constexpr double kSameVelocity_mps = 1.0;
 constexpr int kYoungHits = 10;
-constexpr double kRestSize = 1.2;         // the rest of an object is at most so many times as large as it was
-constexpr double kSameVehicle_m = 0.3;    // a vehicle's parts together are no larger than that beyond what is known
+constexpr double kFree = 0.5;             // evidence of a part that stands where it was free
 constexpr double kStackedOverlap = 0.25;  // share of the smaller height that two halves of one object have in common
 constexpr double kStackedShift_m = 0.4;   // and between their middles in the ground plane
 constexpr double kSameFootprint = 0.4;    // parts above one another share that much of the smaller footprint
@@ -52,55 +51,6 @@ double height_gap_m(const OrientedBox& a, const OrientedBox& b) {
 bool stacked(const OrientedBox& a, const OrientedBox& b) {
     return height_gap_m(a, b) > -kStackedOverlap * std::min(a.size_m.z(), b.size_m.z()) &&
            (a.center_m - b.center_m).head<2>().norm() < kStackedShift_m;
-}
-
-/// How far two boxes together reach along a box's axes in the ground plane, metres.
-Eigen::Vector2d joint_size(const OrientedBox& a, const OrientedBox& b, double yaw_rad) {
-    const Eigen::Vector2d along(std::cos(yaw_rad), std::sin(yaw_rad));
-    const Eigen::Vector2d across(-along.y(), along.x());
-    const auto half = [](const OrientedBox& box, const Eigen::Vector2d& axis) {
-        const double c = std::cos(box.yaw_rad), s = std::sin(box.yaw_rad);
-        return 0.5 * (std::abs(axis.x() * c + axis.y() * s) * box.size_m.x() +
-                      std::abs(axis.y() * c - axis.x() * s) * box.size_m.y());
-    };
-    const auto reach = [&](const Eigen::Vector2d& axis) {
-        const double at = axis.dot((b.center_m - a.center_m).head<2>());
-        return std::max(half(a, axis), at + half(b, axis)) - std::min(-half(a, axis), at - half(b, axis));
-    };
-    return {reach(along), reach(across)};
-}
-
-/// Of a large object that moves slowly only the front stands where it was free: evidence divides it, but its track
-/// knows its extent.
-bool is_rest_of(const TrackedObject& host, const Detection& front, const Detection& rest) {
-    const OrientedBox box = host.box();
-    return host.state() == DynamicState::kDynamic && host.hits() >= kYoungHits &&
-           joint_size(front.box, rest.box, box.yaw_rad).maxCoeff() < kRestSize * box.size_m.head<2>().maxCoeff() &&
-           rest.box.size_m.z() < kRestSize * box.size_m.z();
-}
-
-/// What rested as one vehicle sets off as one, even if its front alone stands where it was free.
-bool sets_off_with(const TrackedObject& host, const Detection& seen, const Detection& part) {
-    if (!host.sets_off()) return false;
-    const OrientedBox box = host.box();
-    const Eigen::Vector2d joint_m = joint_size(seen.box, part.box, box.yaw_rad);
-    return (joint_m.array() < box.size_m.head<2>().array() + kSameVehicle_m).all() &&
-           part.box.size_m.z() < box.size_m.z() + kSameVehicle_m;
-}
-
-/// Share of a part's footprint that lies inside of a box with a margin.
-double share_inside(const OrientedBox& part, OrientedBox box, double margin_m) {
-    box.size_m.head<2>().array() += 2.0 * margin_m;
-    return footprint_intersection_m2(part, box) / (part.size_m.x() * part.size_m.y());
-}
-
-/// Two tracks on one vehicle that an occluder divides: the one inside of the other, at the same velocity.
-bool one_vehicle(const TrackedObject& whole, const TrackedObject& piece) {
-    if (!whole.drives()) return false;
-    const double differs = (whole.velocity() - piece.velocity()).head<2>().norm();
-    const double tolerance = kSameVelocity_mps + 2.0 * (whole.velocity_sd() + piece.velocity_sd());
-    return differs < tolerance && share_inside(piece.box(), whole.box(), kLimbMargin_m) > kInside &&
-           piece.box().size_m.head<2>().norm() < whole.box().size_m.head<2>().norm();
 }
 
 /// A track that sees something low, and is expected inside of a moving object's box, has followed an arm or a leg.
@@ -149,6 +99,7 @@ struct Tracker::State {
 
     void predict(const Frame& frame);
     void associate(Frame& frame);
+    void join_pieces(const Frame& frame);
     void attach_parts(Frame& frame);
     void see_and_miss(Frame& frame);
     void give_birth(Frame& frame);
@@ -179,6 +130,7 @@ struct Tracker::State {
     std::vector<char> limb;      ///< of each detection: 1 beside its object's box: belongs to it, but does not shape it
     std::vector<std::size_t> parts;   ///< detections of the object at hand
     std::vector<std::size_t> strays;  ///< detections without an object
+    std::vector<std::size_t> owned;   ///< detections with an object
     std::vector<Host> hosts;
     std::vector<OrientedBox> boxes;  ///< of the objects
     std::vector<double> reaches_m;   ///< and their half diagonals
@@ -196,11 +148,13 @@ std::uint32_t Tracker::next_id() const {
 void Tracker::process(Frame& frame) {
     frame.detection.tracks.clear();
     frame.detection.cleared.clear();
-    // What was tracked stood elsewhere.
-    if (frame.odometry.earlier_is_void()) state_->objects.clear();
+    // A new map: what was tracked stood in the old one.
+    if ((frame.odometry.flags & OdometryResult::kReinitialized) != 0) state_->objects.clear();
     state_->predict(frame);
     if (frame.odometry.follows_map()) {
+        state_->projection.set(frame.odometry);
         state_->associate(frame);
+        state_->join_pieces(frame);
         state_->attach_parts(frame);
         state_->see_and_miss(frame);
         state_->give_birth(frame);
@@ -226,11 +180,42 @@ void Tracker::State::associate(Frame& frame) {
         for (std::size_t d = 0; d < detections.size(); ++d) candidates.push_back(candidate(detections[d], shapes[d]));
         return association.solve(expected, candidates, config.association, known);
     };
+    absorbed.assign(objects.size(), 0);
     const bool divided = merged.divide(frame, shapes, expected, associated({}));
     const std::vector<int>& detection_of = divided ? associated(merged.known_tracks()) : association.last();
     owner.assign(detections.size(), -1);
     for (std::size_t t = 0; t < detection_of.size(); ++t) {
         if (detection_of[t] >= 0) owner[static_cast<std::size_t>(detection_of[t])] = static_cast<int>(t);
+    }
+}
+
+// One of two tracks on one vehicle gives its piece to the other, whose box takes it in.
+void Tracker::State::join_pieces(const Frame& frame) {
+    const auto& detections = frame.detection.detections;
+    owned.clear();
+    for (std::size_t d = 0; d < detections.size(); ++d) {
+        if (owner[d] >= 0) owned.push_back(d);
+    }
+    const auto object_of = [&](std::size_t d) -> TrackedObject& { return objects[static_cast<std::size_t>(owner[d])]; };
+    const auto front_and_rest = [&](std::size_t front, std::size_t rest) {
+        return candidates[front].motion > kFree && is_at_front_of(detections[rest], detections[front]) &&
+               is_front_of(object_of(rest), object_of(front));
+    };
+    for (std::size_t i = 0; i < owned.size(); ++i) {
+        for (std::size_t j = i + 1; j < owned.size(); ++j) {
+            std::size_t of_host = owned[i], of_guest = owned[j];
+            if (owner[of_host] == owner[of_guest]) continue;
+            const bool divided = detections[of_host].segment == detections[of_guest].segment &&
+                                 (front_and_rest(of_host, of_guest) || front_and_rest(of_guest, of_host));
+            if (!divided && !pieces_of_one_vehicle(object_of(of_host), detections[of_host], object_of(of_guest),
+                                                   detections[of_guest], frame, projection))
+                continue;
+            if (object_of(of_guest).goes_before(object_of(of_host))) std::swap(of_host, of_guest);
+            object_of(of_host).join(detections[of_guest].box);
+            expected[static_cast<std::size_t>(owner[of_host])].whole = object_of(of_host).box();
+            absorbed[static_cast<std::size_t>(owner[of_guest])] = 1;
+            owner[of_guest] = owner[of_host];
+        }
     }
 }
 
@@ -240,7 +225,6 @@ void Tracker::State::associate(Frame& frame) {
 void Tracker::State::attach_parts(Frame& frame) {
     const auto& detections = frame.detection.detections;
     limb.assign(detections.size(), 0);
-    absorbed.assign(objects.size(), 0);
     hosts.clear();
     for (std::size_t d = 0; d < detections.size(); ++d) {
         if (owner[d] < 0 || !objects[static_cast<std::size_t>(owner[d])].steady()) continue;
@@ -340,7 +324,6 @@ void Tracker::State::see_and_miss(Frame& frame) {
         const Sighting sighting = sighting_of(frame, t);
         if (!sighting.detections.empty()) objects[t].see(frame, shapes, sighting, config, frame.detection.cleared);
     }
-    projection.set(frame.odometry);
     for (TrackedObject& object : objects) {
         if (!object.seen()) object.miss(look_at(object.box(), frame, projection));
     }

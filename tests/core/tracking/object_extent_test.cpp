@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <numbers>
+
 namespace dlod {
 namespace {
 
@@ -59,8 +61,26 @@ TEST(ObjectExtent, WhatWasTakenForOneObjectLosesWhatIsTheOthers) {
 
 TEST(ObjectExtent, OnlyWhatIsSeenToBeWideIsAssumedToBeAVehicle) {
     const OrientedBox wide = box(10.0, 0.0, 0.0, {0.9, 1.7, 1.5});
-    EXPECT_NEAR(assumed_growth(wide, 1.7, 5.0, {}).front, 3.1, 1e-9);
-    EXPECT_EQ(assumed_growth(wide, 0.5, 5.0, {}).front, 0.0);
+    EXPECT_NEAR(assumed_growth(wide, {0.9, 1.7, 1.5}, 5.0, {}).front, 3.1, 1e-9);
+    EXPECT_EQ(assumed_growth(wide, {0.9, 0.5, 1.5}, 5.0, {}).front, 0.0);
+}
+
+TEST(ObjectExtent, WhatIsAsLargeAsABusFromBehindIsLongerThanACarUnlessItsSideIsSeen) {
+    const OrientedBox rear = box(10.0, 0.0, 0.0, {4.0, 2.6, 2.9});
+    EXPECT_NEAR(assumed_growth(rear, {0.2, 2.6, 2.9}, 8.0, {}).front, 5.0, 1e-9);
+    EXPECT_EQ(assumed_growth(box(10.0, 0.0, 0.0, {6.0, 2.6, 2.9}), {6.0, 2.6, 2.9}, 8.0, {}).front, 0.0);
+    EXPECT_EQ(assumed_growth(box(10.0, 0.0, 0.0, {4.0, 2.0, 2.4}), {0.2, 2.0, 2.4}, 8.0, {}).front, 0.0) << "a van";
+}
+
+TEST(ObjectExtent, WhatJoinsAnObjectIsEnclosed) {
+    const OrientedBox bumper = box(10.0, 0.0, 0.0, {0.4, 1.8, 0.4});
+    OrientedBox windscreen = box(12.0, 0.5, 0.5, {1.6, 0.8, 0.7});
+    windscreen.yaw_rad = 0.5 * std::numbers::pi;
+    const Growth g = enclosing_growth(bumper, windscreen);
+    EXPECT_NEAR(g.front, 2.2, 1e-9);
+    EXPECT_EQ(g.back, 0.0);
+    EXPECT_NEAR(g.left, 0.4, 1e-9);
+    EXPECT_EQ(g.right, 0.0);
 }
 
 }  // namespace

@@ -285,6 +285,70 @@ TEST_F(TrackerTest, TheRestOfADividedObjectStaysPartOfIt) {
     EXPECT_EQ(scene.frame.detection.tracks[0].state, DynamicState::kDynamic);
 }
 
+// Bonnets return little: of a car that comes only bumper and windscreen are seen.
+TEST_F(TrackerTest, BumperAndWindscreenAreOneTrack) {
+    Tracker tracker(sensor, config);
+    const auto piece = [&](double x, double z, double height_m) {
+        Cylinder c;
+        c.foot_m = {x, 0.0, z};
+        c.radius_m = 0.8;
+        c.height_m = height_m;
+        return c;
+    };
+    for (int k = 0; k < 30; ++k) {
+        scene.next();
+        const double x = 25.0 - 0.4 * k;
+        scene.add(piece(x, -1.0, 0.4));
+        scene.add(piece(x + 1.8, -0.4, 0.6));
+        tracker.process(scene.frame);
+        if (k < 15) continue;
+        ASSERT_EQ(scene.frame.detection.tracks.size(), 1U) << k;
+        EXPECT_EQ(scene.frame.detection.tracks[0].id, 1U);
+        EXPECT_GT(scene.frame.detection.tracks[0].box.size_m.x(), 2.5);
+    }
+}
+
+TEST_F(TrackerTest, ADogBeforeItsOwnerKeepsItsTrack) {
+    Tracker tracker(sensor, config);
+    for (int k = 0; k < 30; ++k) {
+        scene.next();
+        const double x = 12.0 - 0.18 * k;
+        Cylinder dog = person(x, 0.0);
+        dog.radius_m = 0.2;
+        dog.height_m = 0.6;
+        scene.add(dog);
+        scene.add(person(x + 1.3, 0.0));
+        tracker.process(scene.frame);
+        ASSERT_EQ(scene.frame.detection.tracks.size(), 2U) << k;
+    }
+}
+
+// Of a car that crawls only the front stands where it was free.
+TEST_F(TrackerTest, AFrontAsWideAsTheVehicleBelongsToIt) {
+    const auto part = [&](double x, double radius_m) {
+        Cylinder c;
+        c.foot_m = {x, 0.0, -1.2};
+        c.radius_m = radius_m;
+        c.height_m = 1.4;
+        return c;
+    };
+    for (const double radius_m : {0.9, 0.25}) {  // a front, a person who stands in front
+        Tracker tracker(sensor, config);
+        for (int k = 0; k < 24; ++k) {
+            scene.next();
+            auto rest = scene.place(part(8.0, 0.9));
+            const auto back = scene.place(part(10.5, 0.9));
+            rest.insert(rest.end(), back.begin(), back.end());
+            const auto front = scene.place(part(7.2, radius_m));
+            const std::uint32_t segment = scene.detect(rest, false).segment;
+            if (k >= 6) scene.detect(front, true).segment = segment;
+            tracker.process(scene.frame);
+        }
+        EXPECT_EQ(scene.frame.detection.detections[1].track == scene.frame.detection.detections[0].track,
+                  radius_m > 0.5);
+    }
+}
+
 // A track without a detection has no pixels: the reference kept old ones for up to nine scans.
 TEST_F(TrackerTest, AMissedTrackCoastsWithoutPixelsAndDies) {
     Tracker tracker(sensor, config);

@@ -1,0 +1,134 @@
+#include "core/tracking/vehicle_parts.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/tracking/box_iou.hpp"
+
+namespace dlod {
+
+namespace {
+
+constexpr int kKnownHits = 10;          // an extent that can be relied upon
+constexpr double kRestSize = 1.2;       // the rest of an object is at most so many times as large as it was
+constexpr double kSameVehicle_m = 0.3;  // a vehicle's parts together are no larger than that beyond what is known
+constexpr double kMargin_m = 0.4;       // of a piece's place in a vehicle's box
+constexpr double kInside = 0.6;         // of its footprint lies in there
+constexpr double kSameVelocity_mps = 1.0;
+
+// Cars and vans.
+constexpr double kLongest_m = 5.5;
+constexpr double kShortest_m = 2.5;
+constexpr double kWidest_m = 2.7;
+constexpr double kNarrowest_m = 1.2;
+constexpr double kLowest_m = 1.0;
+constexpr double kFrontWidth = 0.6;  // of the width of the whole
+constexpr double kAtTheEnd = 0.2;    // of its length from the middle
+
+constexpr int kPieceHits = 3;
+constexpr double kSameSpeed = 0.15;         // up to that share
+constexpr double kKnownVelocity_mps = 1.5;  // standard deviation
+constexpr double kDriving_mps = 3.0;        // faster than people walk
+constexpr double kRunning_mps = 7.0;        // faster than people run
+constexpr double kLonger_m = 2.0;           // than people and cyclists
+constexpr double kMoving_mps = 1.5;
+constexpr double kBumperHeight_m = 1.0;
+constexpr double kFront_m = 0.8;
+constexpr double kBehind_m = 1.0;  // what is farther than both pieces is seen between them
+constexpr int kPlaces = 5;
+
+double width_across(const OrientedBox& box, const Eigen::Vector2d& axis) {
+    const double c = std::cos(box.yaw_rad), s = std::sin(box.yaw_rad);
+    return std::abs(axis.x() * c + axis.y() * s) * box.size_m.x() +
+           std::abs(axis.y() * c - axis.x() * s) * box.size_m.y();
+}
+
+double longest_m(const OrientedBox& box) {
+    return box.size_m.head<2>().maxCoeff();
+}
+
+/// Bumper and windscreen: both wider than people, the lower one lower, too.
+bool are_front(const OrientedBox& a, const OrientedBox& b, const Eigen::Vector2d& across) {
+    const OrientedBox& lower = a.center_m.z() < b.center_m.z() ? a : b;
+    return lower.size_m.z() < kBumperHeight_m && std::min(width_across(a, across), width_across(b, across)) > kFront_m;
+}
+
+/// Whether something farther than both is seen between two detections.
+bool gap_between(const Detection& a, const Detection& b, const Frame& frame, const SweepProjection& projection) {
+    const Eigen::Vector3d sensor = frame.odometry.T_world_sensor.translation();
+    const double farther = std::max((a.centroid_m - sensor).norm(), (b.centroid_m - sensor).norm()) + kBehind_m;
+    int behind = 0;
+    for (int k = 1; k <= kPlaces; ++k) {
+        const double share = static_cast<double>(k) / (kPlaces + 1);
+        const auto seen = projection.project((1.0 - share) * a.centroid_m + share * b.centroid_m);
+        if (seen && frame.cloud.range_m(seen->pixel.row, seen->pixel.column) > farther) ++behind;
+    }
+    return 2 * behind > kPlaces;
+}
+
+}  // namespace
+
+bool is_rest_of(const TrackedObject& host, const Detection& front, const Detection& rest) {
+    const OrientedBox box = host.box();
+    return host.state() == DynamicState::kDynamic && host.hits() >= kKnownHits &&
+           joint_size(front.box, rest.box, box.yaw_rad).maxCoeff() < kRestSize * box.size_m.head<2>().maxCoeff() &&
+           rest.box.size_m.z() < kRestSize * box.size_m.z();
+}
+
+bool sets_off_with(const TrackedObject& host, const Detection& seen, const Detection& part) {
+    if (!host.sets_off()) return false;
+    const OrientedBox box = host.box();
+    const Eigen::Vector2d joint_m = joint_size(seen.box, part.box, box.yaw_rad);
+    return (joint_m.array() < box.size_m.head<2>().array() + kSameVehicle_m).all() &&
+           part.box.size_m.z() < box.size_m.z() + kSameVehicle_m;
+}
+
+bool is_at_front_of(const Detection& rest, const Detection& front) {
+    const OrientedBox& box = rest.box;
+    if (rest.count < front.count || box.size_m.z() < kLowest_m) return false;
+    const bool along_x = box.size_m.x() >= box.size_m.y();
+    const double yaw = box.yaw_rad + (along_x ? 0.0 : 0.5 * std::numbers::pi);
+    const Eigen::Vector2d along(std::cos(yaw), std::sin(yaw)), across(-along.y(), along.x());
+    const Eigen::Vector2d joint_m = joint_size(box, front.box, yaw);
+    const bool vehicle =
+        joint_m.x() > kShortest_m && joint_m.x() < kLongest_m && joint_m.y() > kNarrowest_m && joint_m.y() < kWidest_m;
+    return vehicle && width_across(front.box, across) > std::max(kNarrowest_m, kFrontWidth * joint_m.y()) &&
+           std::abs(along.dot((front.box.center_m - box.center_m).head<2>())) > kAtTheEnd * joint_m.x();
+}
+
+bool is_front_of(const TrackedObject& rest, const TrackedObject& front) {
+    if (front.state() != DynamicState::kDynamic || front.is_body()) return false;
+    const double differs = (rest.velocity() - front.velocity()).head<2>().norm();
+    return differs < kSameVelocity_mps + 2.0 * rest.velocity_sd() + std::min(kKnownVelocity_mps, front.velocity_sd());
+}
+
+bool one_vehicle(const TrackedObject& whole, const TrackedObject& piece) {
+    if (!whole.drives()) return false;
+    const double differs = (whole.velocity() - piece.velocity()).head<2>().norm();
+    const double tolerance = kSameVelocity_mps + 2.0 * (whole.velocity_sd() + piece.velocity_sd());
+    return differs < tolerance && share_inside(piece.box(), whole.box(), kMargin_m) > kInside &&
+           piece.box().size_m.head<2>().norm() < whole.box().size_m.head<2>().norm();
+}
+
+bool pieces_of_one_vehicle(const TrackedObject& a, const Detection& seen_a, const TrackedObject& b,
+                           const Detection& seen_b, const Frame& frame, const SweepProjection& projection) {
+    const Eigen::Vector2d between = (seen_b.box.center_m - seen_a.box.center_m).head<2>();
+    if (between.squaredNorm() > kLongest_m * kLongest_m || !a.under_way() || !b.under_way()) return false;
+    const double sd = std::max(a.velocity_sd(), b.velocity_sd());
+    if (std::min(a.hits(), b.hits()) < kPieceHits || sd > kKnownVelocity_mps) return false;
+    const Eigen::Vector2d va = a.velocity().head<2>(), vb = b.velocity().head<2>();
+    const double speed = (0.5 * (va + vb)).norm();
+    if (speed < std::max(kMoving_mps, 2.0 * sd)) return false;
+    const double differs = std::hypot(kSameSpeed * speed, a.velocity_sd(), b.velocity_sd());
+    if ((va - vb).norm() > differs) return false;
+    const double yaw = std::atan2(va.y() + vb.y(), va.x() + vb.x());
+    const Eigen::Vector2d joint_m = joint_size(seen_a.box, seen_b.box, yaw);
+    if (joint_m.x() > kLongest_m || joint_m.y() > kWidest_m) return false;
+    const bool larger = std::max(longest_m(a.box()), longest_m(b.box())) > kLonger_m;
+    const Eigen::Vector2d across(-std::sin(yaw), std::cos(yaw));
+    if (speed < (larger ? kDriving_mps : kRunning_mps) && !are_front(a.box(), b.box(), across)) return false;
+    return !gap_between(seen_a, seen_b, frame, projection);
+}
+
+}  // namespace dlod
