@@ -10,6 +10,8 @@
 #include <numbers>
 #include <optional>
 
+#include "driver/printable.hpp"
+
 namespace dlod::driver {
 namespace {
 
@@ -82,7 +84,7 @@ class Reader {
         if (value == nullptr) return {};
         if (value->is_number_unsigned()) return std::to_string(value->get<std::uint64_t>());
         if (!value->is_string()) fail(path(section, key), "must be a text");
-        return value->get<std::string>();
+        return printable(value->get_ref<const std::string&>());
     }
 
     std::vector<double> numbers(std::string_view section, std::string_view key, double limit) const {

@@ -158,7 +158,7 @@ void Detector::process(Frame& frame) {
     frame.detection.pixels.clear();
     frame.detection.detections.clear();
     state.residuals.update(frame.odometry);
-    if ((frame.odometry.flags & OdometryResult::kReinitialized) != 0) state.evidence.forget();
+    if (frame.odometry.earlier_is_void()) state.evidence.forget();
     if (!frame.odometry.follows_map()) return;
     if (state.config.use_free_space) state.test(frame);
     state.detect(frame);

@@ -32,6 +32,7 @@ constexpr float kNearest_m = 4.0F, kNear_m = 8.0F, kMiddle_m = 16.0F;
 /// What one frame adds and clears, kept until it is its turn.
 struct Postponed {
     std::int64_t time_ns = 0;
+    std::int64_t stamp_ns = 0;
     MapPoints points;
     std::vector<OrientedBox> cleared;
 };
@@ -123,6 +124,7 @@ struct GlobalMap::State {
     void postpone(const Frame& frame, Postponed& out);
     std::size_t select(const Frame& frame);
     void leave_out_pieces(const std::vector<Track>& tracks, MapPoints& points);
+    void leave_out(std::int64_t stamp_ns);
     void enter(Postponed& postponed);
     void clear_some(std::size_t budget);
     void sweep_unconfirmed();
@@ -151,6 +153,7 @@ GlobalMap::~GlobalMap() = default;
 
 void GlobalMap::update(const Frame& frame) {
     State& s = *state_;
+    if (frame.odometry.void_scan_ns) s.leave_out(*frame.odometry.void_scan_ns);
     Postponed& slot = s.waiting[s.frames++ % s.waiting.size()];
     s.enter(slot);  // what came delay_frames + 1 frames ago
     s.postpone(frame, slot);
@@ -182,6 +185,7 @@ void GlobalMap::State::postpone(const Frame& frame, Postponed& out) {
         time_ns += std::clamp<std::int64_t>(frame.header.stamp_ns - last_stamp_ns, 0, kLongestTurn_ns);
     last_stamp_ns = frame.header.stamp_ns;
     out.time_ns = time_ns;
+    out.stamp_ns = frame.header.stamp_ns;
     if (!frame.odometry.valid) return;
     position_m = frame.odometry.T_world_sensor.translation();
     out.cleared.assign(frame.detection.cleared.begin(), frame.detection.cleared.end());
@@ -236,6 +240,13 @@ std::size_t GlobalMap::State::select(const Frame& frame) {
         }
     }
     return count;
+}
+
+/// The points of the frame of that stamp, if they still wait.
+void GlobalMap::State::leave_out(std::int64_t stamp_ns) {
+    for (Postponed& p : waiting) {
+        if (p.stamp_ns == stamp_ns) p.points.resize(0);
+    }
 }
 
 void GlobalMap::State::enter(Postponed& postponed) {

@@ -97,7 +97,7 @@ std::uint32_t VoxelMap::make_facet() {
     }
     const std::uint32_t slot = free_facets_.back();
     free_facets_.pop_back();
-    facets_[slot] = Facet{};
+    facets_[slot] = Moments{};
     return slot;
 }
 
@@ -131,8 +131,8 @@ void VoxelMap::accumulate(std::span<const FixedPoint> points, int sign) {
             voxel.facet[side] = make_facet();
             ++voxel.facets;
         }
-        Facet& facet = facets_[voxel.facet[side]];
-        Moments& m = facet.moments;
+        const std::uint32_t facet = voxel.facet[side];
+        Moments& m = facets_[facet];
         const std::int64_t d[3] = {p.x - (std::int64_t{index.x} * side_ + side_ / 2),
                                    p.y - (std::int64_t{index.y} * side_ + side_ / 2),
                                    p.z - (std::int64_t{index.z} * side_ + side_ / 2)};
@@ -148,9 +148,9 @@ void VoxelMap::accumulate(std::span<const FixedPoint> points, int sign) {
                 m.square[k] += weight * (d[i] * d[j] + own);
             }
         }
-        facet.fitted = voxel.fitted = false;
+        facet_planes_[facet].fitted = voxel_planes_[slot].fitted = false;
         if (m.points == 0) {
-            free_facets_.push_back(voxel.facet[side]);
+            free_facets_.push_back(facet);
             voxel.facet[side] = kNone;
             --voxel.facets;
         }
@@ -199,7 +199,7 @@ const VoxelPlane* VoxelMap::find_facet(VoxelIndex index, const float normal[3]) 
     for (std::size_t side = 0; side < kNoNormal; ++side) {
         const std::uint32_t facet = voxels_[slot].facet[side];
         if (facet == kNone) continue;
-        if (!facets_[facet].fitted) fit_facet(facet);
+        if (!facet_planes_[facet].fitted) fit_facet(facet);
         const VoxelPlane& plane = facet_planes_[facet];
         if (!plane.flat) continue;
         // The fit gives the normal but for its sign; the facet's side has it.
@@ -215,23 +215,21 @@ const VoxelPlane* VoxelMap::find_facet(VoxelIndex index, const float normal[3]) 
 }
 
 void VoxelMap::fit_facet(std::uint32_t slot) {
-    facets_[slot].fitted = true;
-    fit(facets_[slot].moments, facet_planes_[slot]);
+    fit(facets_[slot], facet_planes_[slot]);
 }
 
 /// All facets together; one alone is the voxel.
 void VoxelMap::fit_voxel(std::uint32_t slot) {
-    Voxel& voxel = voxels_[slot];
-    voxel.fitted = true;
+    const Voxel& voxel = voxels_[slot];
     Moments all;
     for (const std::uint32_t i : voxel.facet) {
         if (i == kNone) continue;
         if (voxel.facets == 1) {
-            if (!facets_[i].fitted) fit_facet(i);
+            if (!facet_planes_[i].fitted) fit_facet(i);
             voxel_planes_[slot] = facet_planes_[i];
             return;
         }
-        const Moments& m = facets_[i].moments;
+        const Moments& m = facets_[i];
         all.points += m.points;
         all.weight += m.weight;
         for (std::size_t k = 0; k < 3; ++k) all.sum[k] += m.sum[k];
@@ -241,6 +239,7 @@ void VoxelMap::fit_voxel(std::uint32_t slot) {
 }
 
 void VoxelMap::fit(const Moments& m, VoxelPlane& plane) const {
+    plane.fitted = true;
     plane.points = static_cast<std::uint32_t>(m.points);
     const double n = m.weight;
     const auto sum = [&](std::size_t k) { return static_cast<double>(m.sum[k]); };

@@ -63,10 +63,11 @@ struct VoxelIndex {
 struct alignas(64) VoxelPlane {
     float mean[3];
     float normal[3];
-    float thickness_m;  ///< standard deviation along the normal, at least the configured floor
-    float extent_m[2];  ///< standard deviations along the two tangents
-    float tangent[3];   ///< direction of the larger extent
-    bool flat;          ///< false: too few points or too thick, the normal means nothing
+    float thickness_m;    ///< standard deviation along the normal, at least the configured floor
+    float extent_m[2];    ///< standard deviations along the two tangents
+    float tangent[3];     ///< direction of the larger extent
+    bool flat;            ///< false: too few points or too thick, the normal means nothing
+    bool fitted = false;  ///< the map's own: false where the moments have changed since
     std::uint32_t points;
 };
 
@@ -81,6 +82,11 @@ class VoxelMap {
 
     /// The plane of all that is in the voxel, nullptr where it is empty. Fits it if needed.
     const VoxelPlane* find(VoxelIndex index);
+    /// find() in two steps, between which the processor fetches the plane: where() for all of some points, then
+    /// plane_at() for each. @return kNowhere where the voxel is empty; holds until points are added or removed
+    std::uint32_t where(VoxelIndex index);
+    const VoxelPlane& plane_at(std::uint32_t place);
+    static constexpr std::uint32_t kNowhere = ~std::uint32_t{0};
     /// Of the voxel's flat facets the one that faces most nearly where `normal` (unit) points; nullptr: none faces that
     /// half of all directions.
     const VoxelPlane* find_facet(VoxelIndex index, const float normal[3]);
@@ -101,18 +107,13 @@ class VoxelMap {
         std::array<std::int64_t, 3> sum{};     ///< of positions relative to the voxel's centre
         std::array<std::int64_t, 6> square{};  ///< xx, xy, xz, yy, yz, zz, with the discs' own
     };
-    static constexpr std::uint32_t kNone = ~std::uint32_t{0};
+    static constexpr std::uint32_t kNone = kNowhere;
     /// The six sides that a surface may face, and one for points without a normal.
     static constexpr std::size_t kFacets = 7;
     static constexpr std::size_t kNoNormal = 6;
     struct Voxel {
         std::array<std::uint32_t, kFacets> facet;  ///< slots, kNone where there is none
         std::int32_t facets = 0;
-        bool fitted = false;
-    };
-    struct Facet {
-        Moments moments;
-        bool fitted = false;
     };
     static constexpr std::uint64_t kEmpty = ~std::uint64_t{0};
     static constexpr int kBlockBits = 2;  ///< a block has 2^kBlockBits voxels a side
@@ -155,7 +156,7 @@ class VoxelMap {
     std::vector<Voxel> voxels_;               ///< by slot
     std::vector<VoxelPlane> voxel_planes_;    ///< by slot
     std::vector<std::uint32_t> free_voxels_;  ///< slots
-    std::vector<Facet> facets_;               ///< by slot of its own
+    std::vector<Moments> facets_;             ///< by slot of its own
     std::vector<VoxelPlane> facet_planes_;    ///< likewise
     std::vector<std::uint32_t> free_facets_;  ///< likewise
     std::size_t voxel_count_ = 0;
@@ -200,11 +201,20 @@ inline std::uint32_t VoxelMap::voxel_at(VoxelIndex index) {
     return block == kNone ? kNone : blocks_[block].slot[position_in_block(index)];
 }
 
+inline std::uint32_t VoxelMap::where(VoxelIndex index) {
+    const std::uint32_t slot = voxel_at(index);
+    if (slot != kNone) __builtin_prefetch(&voxel_planes_[slot]);
+    return slot;
+}
+
+inline const VoxelPlane& VoxelMap::plane_at(std::uint32_t place) {
+    if (!voxel_planes_[place].fitted) fit_voxel(place);
+    return voxel_planes_[place];
+}
+
 inline const VoxelPlane* VoxelMap::find(VoxelIndex index) {
     const std::uint32_t slot = voxel_at(index);
-    if (slot == kNone) return nullptr;
-    if (!voxels_[slot].fitted) fit_voxel(slot);
-    return &voxel_planes_[slot];
+    return slot == kNone ? nullptr : &plane_at(slot);
 }
 
 template <class F>
@@ -233,8 +243,7 @@ void VoxelMap::for_each_around(VoxelIndex center, F&& f) {
                     const VoxelIndex index{bx * kSide + (bit & 3), by * kSide + ((bit >> 2) & 3),
                                            bz * kSide + (bit >> 4)};
                     const std::uint32_t slot = blocks_[block].slot[static_cast<std::size_t>(bit)];
-                    if (!voxels_[slot].fitted) fit_voxel(slot);
-                    f(index, voxel_planes_[slot]);
+                    f(index, plane_at(slot));
                 }
             }
         }

@@ -29,6 +29,9 @@ constexpr int kFirstDirections = 8;
 constexpr int kTrialPasses = 2;
 constexpr int kTrialIterations = 4;
 constexpr double kClearlyBetterFit = 1.02;
+// A first scan whose points turn out to be off by more, at that distance, is void.
+constexpr double kMaxSkew_m = 0.05;
+constexpr double kSkewReach_m = 10.0;
 // Gates open as the prediction's standard deviation grows beyond this.
 constexpr double kSureDeviation_m = 0.1;
 constexpr double kMaxWidening = 3.0;
@@ -57,6 +60,7 @@ bool Odometry::State::estimate(const Frame& frame) {
         register_frame(frame, widening > 1.0 ? kBootstrapIterations : config.scan_to_scan.iterations, widening);
     }
     if (is_trustworthy()) {
+        if (bootstrapping && first_scan_is_void()) void_scan_ns = first_filter.stamp_ns();
         filter.finish_update();
         held.end_frame();
         if (filter.uses_imu() && monitor.quiet()) {
@@ -130,6 +134,14 @@ MotionFilter Odometry::State::likeliest_start(const Frame& frame, const MotionFi
     }
     flags = flags_before;
     return best;
+}
+
+/// The first scan was published deskewed for a motion that was not its own: its points are off by more than a little.
+bool Odometry::State::first_scan_is_void() const {
+    const MotionState& now = first_filter.state();
+    const double turn_rad = (now.rate_radps - first_motion.rate_radps).norm() * first_duration_s;
+    const double way_m = (now.velocity_mps - first_motion.velocity_mps).norm() * first_duration_s;
+    return way_m + kSkewReach_m * turn_rad > kMaxSkew_m;
 }
 
 /// Registers the scan and deskews the first one for the motion that this gives, so many times.

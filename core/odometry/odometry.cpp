@@ -50,6 +50,7 @@ void Odometry::State::process(Frame& frame, const OdometryFeedback* feedback) {
     iterations = 0;
     registered = false;
     trusted = true;
+    void_scan_ns.reset();
     const double step_s = static_cast<double>(frame.header.stamp_ns - filter.stamp_ns()) * 1e-9;
     const bool lost = started && static_cast<double>(frame.header.stamp_ns - last_registered_ns) * 1e-9 > kLost_s;
     if (!started) {
@@ -185,6 +186,7 @@ void Odometry::State::start(const Frame& frame, const Eigen::Isometry3d& T_world
     choose_origin();
     update_sweep(frame);
     first_filter = filter;
+    first_motion = filter.state();
     first_points = frame.prepared.points;
     first_duration_s = static_cast<double>(motion.duration_s);
     place(first_points, motion, placed);

@@ -41,9 +41,31 @@ void Odometry::State::write_result(Frame& frame) {
                              out.residual_m, &frame.prepared.ground);
     out.residual_cap_m = static_cast<float>(config.scan_to_submap.residual_cap_m);
     // A first scan has been deskewed without its velocity: it is no keyframe.
+    out.void_scan_ns = void_scan_ns;
     out.keyframe =
         registered && !bootstrapping && keyframes.is_due(out.T_world_sensor, median_range(frame.prepared.points));
-    if (out.keyframe) keyframes.announce(out.T_world_sensor, out.covariance);
+    if (!out.keyframe) return;
+    keyframes.announce(out.T_world_sensor, out.covariance);
+    write_keyframe_points(frame);
+}
+
+/// The placed points as seen from the sensor at the stamp.
+void Odometry::State::write_keyframe_points(Frame& frame) const {
+    auto& out = frame.odometry.keyframe_points;
+    for (auto& values : out) {
+        values.reserve(frame.prepared.points.pixel.capacity());
+        values.resize(placed.size());
+    }
+    const Eigen::Isometry3f T =
+        (frame.odometry.T_world_sensor.inverse() * Eigen::Translation3d(origin_m)).cast<float>();
+    for (std::size_t i = 0; i < placed.size(); ++i) {
+        const Eigen::Vector3f p = T * Eigen::Vector3f(placed.x[i], placed.y[i], placed.z[i]);
+        const Eigen::Vector3f n = T.linear() * Eigen::Vector3f(placed.nx[i], placed.ny[i], placed.nz[i]);
+        for (Eigen::Index k = 0; k < 3; ++k) {
+            out[static_cast<std::size_t>(k)][i] = p[k];
+            out[static_cast<std::size_t>(k) + 3][i] = n[k];
+        }
+    }
 }
 
 /// How uncertain the submap is that the pose rests on. Along what is held that is still the one that was left behind:
@@ -65,6 +87,7 @@ void Odometry::State::write_nothing(Frame& frame) const {
     out.gravity_mps2 = filter.state().gravity_mps2;
     out.valid = false;
     out.keyframe = false;
+    out.void_scan_ns.reset();
     out.flags = OdometryResult::kPredictedOnly;
     out.iterations = 0;
     out.correspondences = 0;

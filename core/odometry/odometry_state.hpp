@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -44,6 +45,7 @@ struct Odometry::State {
     void settle(const Frame& frame, int passes, int iterations_a_pass);
     void begin_again(const Frame& frame);
     double fit() const;
+    bool first_scan_is_void() const;
     void place_provisional();
     bool is_trustworthy();
     void choose_origin();
@@ -53,6 +55,7 @@ struct Odometry::State {
     void see_turn(std::int64_t stamp_ns);
     void update_anchor(const Eigen::Vector3d& position_m);
     void write_result(Frame& frame);
+    void write_keyframe_points(Frame& frame) const;
     void write_nothing(Frame& frame) const;
     Eigen::Vector3d mean_force(const Frame& frame) const;
     double median_range(const PointSelection& points);
@@ -73,6 +76,7 @@ struct Odometry::State {
     MotionFilter first_filter;       ///< while bootstrapping: at the stamp of that scan
     PointSelection first_points;     ///< while bootstrapping: of that scan
     double first_duration_s = 0.0;   ///< while bootstrapping: of that scan
+    MotionState first_motion;        ///< while bootstrapping: that it was published with
     HeldDirections held;
     std::int64_t last_registered_ns = 0;
     Matrix6d anchor = Matrix6d::Zero();                                ///< covariance of what the pose is relative to
@@ -84,7 +88,8 @@ struct Odometry::State {
     // Of the present frame.
     std::uint32_t flags = 0;
     bool registered = false;
-    bool trusted = true;  ///< false: what this frame gives is not to be used
+    bool trusted = true;                       ///< false: what this frame gives is not to be used
+    std::optional<std::int64_t> void_scan_ns;  ///< as in the result
     SweepMotion motion;
     PlacedPoints placed;  ///< the frame's points after that motion
     VoxelIndex origin;

@@ -91,6 +91,7 @@ PlaneWindows::PlaneWindows(const SensorModel& sensor, int column_step)
         model.cos_offset = std::cos(sensor.azimuth_offset_rad[static_cast<std::size_t>(row)]);
         model.sin_offset = -std::sin(sensor.azimuth_offset_rad[static_cast<std::size_t>(row)]);
         Eigen::Matrix<double, kWindowPixels, 3> X;
+        Eigen::Matrix<double, kWindowPixels, 4> fired;  // when, and from where
         for (int k = 0; k < kWindowPixels; ++k) {
             const int other = std::min(model.first_row + k / kWindowSide, h - 1);
             const double alt = sensor.altitude_rad[static_cast<std::size_t>(other)];
@@ -99,12 +100,25 @@ PlaneWindows::PlaneWindows(const SensorModel& sensor, int column_step)
             X(k, 0) = 1.0;
             X(k, 1) = std::cos(alt) * std::sin(azimuth) / depth;
             X(k, 2) = (std::sin(alt) * std::cos(alt0) - std::cos(alt) * std::sin(alt0) * std::cos(azimuth)) / depth;
+            const int behind =
+                sensor.pixel_shift[static_cast<std::size_t>(row)] - sensor.pixel_shift[static_cast<std::size_t>(other)];
+            fired(k, 0) = k % kWindowSide - kWindowRadius + std::remainder(behind, w);
+            // The beam's origin lies in the direction of the encoder, clockwise of the beam by minus its offset.
+            const double encoder0 = -static_cast<double>(sensor.azimuth_offset_rad[static_cast<std::size_t>(row)]);
+            const double encoder = encoder0 + fired(k, 0) * per_column;
+            const double radial = static_cast<double>(sensor.beam_origin_m) * (std::cos(encoder) - std::cos(encoder0));
+            fired(k, 1) = radial * std::cos(alt0);
+            fired(k, 2) = static_cast<double>(sensor.beam_origin_m) * (std::sin(encoder) - std::sin(encoder0));
+            fired(k, 3) = -radial * std::sin(alt0);
             model.scale[k] = static_cast<float>(1.0 / depth);
             model.azimuth[k] = static_cast<float>(X(k, 1));
             model.altitude[k] = static_cast<float>(X(k, 2));
         }
         const Eigen::Matrix<double, 3, kWindowPixels> solver =
             (X.transpose() * X + 1e-12 * Eigen::Matrix3d::Identity()).inverse() * X.transpose();
+        const Eigen::Matrix<float, 3, 4> firing = (solver * fired).cast<float>();
+        model.firing.time = {firing(0, 0), firing(1, 0), firing(2, 0)};
+        for (int i = 0; i < 3; ++i) model.firing.origin[i] = {firing(0, i + 1), firing(1, i + 1), firing(2, i + 1)};
         for (int i = 0; i < 3; ++i) {
             for (int k = 0; k < kWindowPixels; ++k) {
                 model.weight[i][k] = static_cast<float>(solver(i, k)) * model.scale[k];

@@ -30,6 +30,17 @@ struct BeamFrame {
     Eigen::Vector3f direction, along_row, up;
 };
 
+/// When and from where the pixels of a window were fired, relative to the pixel in the centre: linear in the tangent
+/// plane, fitted as the inverse range is. With beams of different azimuths a window's rows were fired up to some 50
+/// columns apart, from origins up to a centimetre apart. What the fit sees is the surface as at that time, from there.
+struct WindowFiring {
+    struct Linear {
+        float centre, along_row, up;
+    };
+    Linear time;       ///< columns
+    Linear origin[3];  ///< metres; component of the beam's origin along BeamFrame's direction, along_row and up
+};
+
 class PlaneWindows {
   public:
     PlaneWindows(const SensorModel& sensor, int column_step);
@@ -46,6 +57,8 @@ class PlaneWindows {
     }
     /// @param measurement column in which the pixel was fired
     BeamFrame beam(int row, int measurement) const;
+    /// Of all windows whose centre lies in `row`.
+    const WindowFiring& firing(int row) const { return model_[static_cast<std::size_t>(row)].firing; }
 
   private:
     /// Weights of a window's pixels in inverse range and its two slopes, and the tangent-plane coordinates.
@@ -54,6 +67,7 @@ class PlaneWindows {
         float scale[kWindowPixels];  ///< 1 / (u . d): inverse range to inverse depth along the centre beam
         float azimuth[kWindowPixels];
         float altitude[kWindowPixels];
+        WindowFiring firing;
         int first_row = 0;  ///< topmost row of the window; clamped at the image's edge
         float cos_altitude = 1.0F;
         float sin_altitude = 0.0F;

@@ -65,6 +65,9 @@ void Subsampling::collect_row(const Frame& frame, int row) {
     const auto min_incidence = static_cast<float>(config_.min_incidence);
     // Columns per spacing at one metre of range.
     const auto columns_at_1m = static_cast<float>(config_.spacing_m * w / (2.0 * std::numbers::pi));
+    const auto column_s = static_cast<float>(sensor_.frame_period_s / w);
+    const WindowFiring& firing = windows_.firing(row);
+    const int delay = static_cast<int>(std::lround(firing.time.centre));
     const float* range = frame.cloud.range_m.row(row);
     const std::uint32_t* raw = frame.raw.range_mm.row(row);
     const float* x = frame.cloud.x.row(row);
@@ -90,13 +93,28 @@ void Subsampling::collect_row(const Frame& frame, int row) {
             const float length = std::sqrt(inverse * inverse + b * b + g * g);
             if (inverse >= min_incidence * length) {
                 const BeamFrame beam = windows_.beam(row, measurement);
-                const Eigen::Vector3f normal = -(inverse * beam.direction + b * beam.along_row + g * beam.up) / length;
+                // The normal in the axes of the beam, as if all pixels had one origin, and what their origins add.
+                const float n[3] = {-inverse / length, -b / length, -g / length};
+                float along_row = 0.0F;
+                float up = 0.0F;
+                for (int axis = 0; axis < 3; ++axis) {
+                    along_row += firing.origin[axis].along_row * n[axis];
+                    up += firing.origin[axis].up * n[axis];
+                }
+                const Eigen::Vector3f normal = (n[0] * beam.direction + (n[1] - inverse * along_row) * beam.along_row +
+                                                (n[2] - inverse * up) * beam.up)
+                                                   .normalized();
                 const float ratio = planes_.deviation_m[i] / max_deviation;
-                const float smoothing = 1.0F / inverse - windows_.distance(raw[c]);
+                const float smoothing = 1.0F / inverse - windows_.distance(raw[c]) + firing.origin[0].centre;
+                const Eigen::Vector3f shift = smoothing * beam.direction + firing.origin[1].centre * beam.along_row +
+                                              firing.origin[2].centre * beam.up;
+                const Eigen::Vector3f time_gradient =
+                    column_s * inverse * (firing.time.along_row * beam.along_row + firing.time.up * beam.up);
                 flat_.push_back({static_cast<PixelIndex>(first + c), static_cast<std::uint16_t>(measurement),
-                                 direction_bin(normal), 1.0F - 0.9F * ratio * ratio,
-                                 x[c] + smoothing * beam.direction.x(), y[c] + smoothing * beam.direction.y(),
-                                 z[c] + smoothing * beam.direction.z(), normal.x(), normal.y(), normal.z()});
+                                 static_cast<std::uint16_t>(std::clamp(measurement + delay, 0, w - 1)),
+                                 direction_bin(normal), 1.0F - 0.9F * ratio * ratio, x[c] + shift.x(), y[c] + shift.y(),
+                                 z[c] + shift.z(), normal.x(), normal.y(), normal.z(), column_s * firing.time.centre,
+                                 time_gradient.x(), time_gradient.y(), time_gradient.z()});
                 continue;
             }
         }
@@ -108,13 +126,13 @@ void Subsampling::collect_row(const Frame& frame, int row) {
 
 /// Counting sort of the candidates' numbers into order_.
 template <class Candidate>
-void Subsampling::sort_by_measurement(const std::vector<Candidate>& candidates) {
+void Subsampling::sort_by_firing(const std::vector<Candidate>& candidates) {
     next_.assign(static_cast<std::size_t>(sensor_.width) + 1, 0);
-    for (const Candidate& c : candidates) ++next_[std::size_t{c.measurement} + 1];
+    for (const Candidate& c : candidates) ++next_[std::size_t{c.place()} + 1];
     for (std::size_t m = 1; m < next_.size(); ++m) next_[m] += next_[m - 1];
     order_.resize(candidates.size());
     for (std::size_t i = 0; i < candidates.size(); ++i) {
-        order_[next_[candidates[i].measurement]++] = static_cast<std::uint32_t>(i);
+        order_[next_[candidates[i].place()]++] = static_cast<std::uint32_t>(i);
     }
 }
 
@@ -142,8 +160,8 @@ void Subsampling::select(Frame& frame) {
     points.measurement.reserve(flat_.capacity());
     points.pixel.resize(total);
     points.measurement.resize(total);
-    for (auto* values :
-         {&points.x, &points.y, &points.z, &points.nx, &points.ny, &points.nz, &points.planarity, &points.time_s}) {
+    for (auto* values : {&points.x, &points.y, &points.z, &points.nx, &points.ny, &points.nz, &points.planarity,
+                         &points.time_s, &points.tx, &points.ty, &points.tz}) {
         values->reserve(flat_.capacity());
         values->resize(total);
     }
@@ -151,7 +169,7 @@ void Subsampling::select(Frame& frame) {
         return static_cast<float>(frame.columns.time_ns[measurement] - frame.header.stamp_ns) * 1e-9F;
     };
     // In the order of their firing, so that neighbours share their place in the sweep.
-    sort_by_measurement(flat_);
+    sort_by_firing(flat_);
     std::size_t at = 0;
     for (const std::uint32_t i : order_) {
         const Flat& c = flat_[i];
@@ -164,10 +182,13 @@ void Subsampling::select(Frame& frame) {
         points.ny[at] = c.ny;
         points.nz[at] = c.nz;
         points.planarity[at] = c.planarity;
-        points.time_s[at] = time_of(c.measurement);
+        points.time_s[at] = std::min(0.0F, time_of(c.measurement) + c.delay_s);
+        points.tx[at] = c.tx;
+        points.ty[at] = c.ty;
+        points.tz[at] = c.tz;
         ++at;
     }
-    sort_by_measurement(rough_);
+    sort_by_firing(rough_);
     const int available = static_cast<int>(rough_.size());
     const int wanted = std::clamp(config_.least_points - static_cast<int>(flat_.size()), 0, available);
     int credit = 0;
@@ -182,6 +203,7 @@ void Subsampling::select(Frame& frame) {
         points.y[at] = frame.cloud.y[c.pixel];
         points.z[at] = frame.cloud.z[c.pixel];
         points.nx[at] = points.ny[at] = points.nz[at] = 0.0F;
+        points.tx[at] = points.ty[at] = points.tz[at] = 0.0F;
         points.planarity[at] = takes_part ? kRawPlanarity : 0.0F;
         points.time_s[at] = time_of(c.measurement);
         ++at;

@@ -58,21 +58,26 @@ class Subsampling {
     struct Rough {
         PixelIndex pixel;
         std::uint16_t measurement;
+        std::uint16_t place() const { return measurement; }  ///< in the order of firing, columns
     };
     struct Flat {
         PixelIndex pixel;
         std::uint16_t measurement;
+        std::uint16_t fired;     ///< column of the window's mean firing time
         std::uint8_t direction;  ///< bin of the normal
         float planarity;
         float x, y, z;  ///< smoothed along the beam
         float nx, ny, nz;
+        float delay_s;     ///< time of the window's fit after the pixel's
+        float tx, ty, tz;  ///< gradient of the firing time over the window, s/m
+        std::uint16_t place() const { return fired; }
     };
 
     void collect_row(const Frame& frame, int row);
     void thin_out();
     void select(Frame& frame);
     template <class Candidate>
-    void sort_by_measurement(const std::vector<Candidate>& candidates);
+    void sort_by_firing(const std::vector<Candidate>& candidates);
 
     SensorModel sensor_;
     SubsamplingConfig config_;
@@ -81,8 +86,8 @@ class Subsampling {
     std::vector<Flat> flat_;
     std::vector<Rough> rough_;
     std::vector<int> candidate_rows_;
-    std::vector<std::uint32_t> order_;  ///< scratch of sort_by_measurement
-    std::vector<std::uint32_t> next_;   ///< scratch of sort_by_measurement
+    std::vector<std::uint32_t> order_;  ///< scratch of sort_by_firing
+    std::vector<std::uint32_t> next_;   ///< scratch of sort_by_firing
 };
 
 }  // namespace dlod

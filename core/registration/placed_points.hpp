@@ -15,6 +15,9 @@ struct PlacedPoints {
     std::size_t size() const { return x.size(); }
 };
 
+/// The normals are from windows of the image, whose pixels were fired one after another: what the sensor came nearer
+/// meanwhile, of a surface ahead, has turned it, by v / (2 pi f d) at the distance d with f turns a second. With the
+/// gradient of the firing time this is undone.
 /// Moves the first `count` points; the others' values are undefined. Fast when neighbours in the selection were fired
 /// at similar times.
 void place(const PointSelection& points, std::size_t count, const SweepMotion& motion, PlacedPoints& placed);

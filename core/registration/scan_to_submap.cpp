@@ -1,10 +1,13 @@
 #include "core/registration/scan_to_submap.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace dlod {
 namespace {
+
+constexpr std::size_t kBatch = 64;  // points that are looked up before any is worked on
 
 inline float dot(const float a[3], const float b[3]) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -105,14 +108,25 @@ void ScanToSubmap::residuals(const PointSelection& points, const PlacedPoints& p
     pixel.resize(points.size());
     residual_m.resize(points.size());
     std::size_t count = 0;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-        if (ground != nullptr && (*ground)[points.pixel[i]] != 0) continue;
-        const float q[3] = {placed.x[i], placed.y[i], placed.z[i]};
-        const Cell cell = cell_of(q, origin, side, inverse_side);
-        const VoxelPlane* plane = map.find(cell.index);
-        residual_m[count] = plane != nullptr ? std::min(cap, distance_to(*plane, cell.offset))
-                                             : distance_to_neighbours(map, cell, side, cap);
-        pixel[count++] = points.pixel[i];
+    struct Searched {
+        Cell cell;
+        std::uint32_t place;
+    };
+    std::array<Searched, kBatch> batch;
+    for (std::size_t i = 0; i < points.size();) {
+        const std::size_t first = count;
+        for (; i < points.size() && count - first < kBatch; ++i) {
+            if (ground != nullptr && (*ground)[points.pixel[i]] != 0) continue;
+            const float q[3] = {placed.x[i], placed.y[i], placed.z[i]};
+            const Cell cell = cell_of(q, origin, side, inverse_side);
+            batch[count - first] = {cell, map.where(cell.index)};
+            pixel[count++] = points.pixel[i];
+        }
+        for (std::size_t k = first; k < count; ++k) {
+            const auto& [cell, place] = batch[k - first];
+            residual_m[k] = place != VoxelMap::kNowhere ? std::min(cap, distance_to(map.plane_at(place), cell.offset))
+                                                        : distance_to_neighbours(map, cell, side, cap);
+        }
     }
     pixel.resize(count);
     residual_m.resize(count);

@@ -148,8 +148,8 @@ std::uint32_t Tracker::next_id() const {
 void Tracker::process(Frame& frame) {
     frame.detection.tracks.clear();
     frame.detection.cleared.clear();
-    // A new map: what was tracked stood in the old one.
-    if ((frame.odometry.flags & OdometryResult::kReinitialized) != 0) state_->objects.clear();
+    // What was tracked stood elsewhere.
+    if (frame.odometry.earlier_is_void()) state_->objects.clear();
     state_->predict(frame);
     if (frame.odometry.follows_map()) {
         state_->projection.set(frame.odometry);

@@ -13,7 +13,9 @@
 
 #include <Eigen/Geometry>
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace dlod {
@@ -58,11 +60,12 @@ struct PointSelection {
     AlignedVector<float> nx, ny, nz;  ///< unit normal towards the sensor, from the range-image window; 0, 0, 0: unknown
     AlignedVector<float> planarity;   ///< weight in the registration: 1 flat .. 0 no part in it
     AlignedVector<float> time_s;      ///< firing time relative to the frame's stamp, at most 0
+    AlignedVector<float> tx, ty, tz;  ///< gradient of that time over the window that the normal is from, s/m
     std::size_t size() const { return pixel.size(); }
     void clear() {
         pixel.clear();
         measurement.clear();
-        for (auto* v : {&x, &y, &z, &nx, &ny, &nz, &planarity, &time_s}) v->clear();
+        for (auto* v : {&x, &y, &z, &nx, &ny, &nz, &planarity, &time_s, &tx, &ty, &tz}) v->clear();
     }
 };
 
@@ -90,6 +93,8 @@ struct OdometryResult {
     /// Good enough for seeing what moves: valid, or else registered with the local map but adrift along a direction in
     /// which nothing is to be seen.
     bool follows_map() const { return valid || (flags & (kDegenerate | kPredictedOnly)) == kDegenerate; }
+    /// What earlier frames saw does not fit this one: a new map, or one whose first scan is void.
+    bool earlier_is_void() const { return (flags & kReinitialized) != 0 || void_scan_ns.has_value(); }
     Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();  ///< at the frame's stamp
     Eigen::Vector3d linear_velocity_mps = Eigen::Vector3d::Zero();     ///< sensor frame
     Eigen::Vector3d angular_velocity_radps = Eigen::Vector3d::Zero();  ///< sensor frame
@@ -98,12 +103,17 @@ struct OdometryResult {
     int iterations = 0;
     int correspondences = 0;
     bool keyframe = false;          ///< becomes a keyframe once its moving points have been removed
+    /// Stamp of the scan that the map began with, where it turns out to have been deskewed for another motion than it
+    /// had: nothing that was learnt from it holds.
+    std::optional<std::int64_t> void_scan_ns;
     /// Residuals of the scan-to-submap registration: distance of each registered point to its counterpart.
     AlignedVector<PixelIndex> residual_pixel;
     AlignedVector<float> residual_m;
     float residual_cap_m = 0.0F;    ///< what residual_m says where nothing of the submap is near
     /// Rows of T_stamp_column by measurement: turns a point of StructuredCloud into the sensor frame at the stamp.
     AlignedVector<float> deskew[12];  ///< row-major 3 x 4, each [W]
+    /// Of a keyframe: position and normal (x, y, z, nx, ny, nz) of Preparation::points, deskewed, sensor frame at the stamp.
+    std::array<AlignedVector<float>, 6> keyframe_points;
     /// The deskewed cloud: sensor frame at the stamp; 0, 0, 0 where there is no return.
     Image<float> x, y, z;
 };

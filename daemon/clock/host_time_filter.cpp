@@ -20,6 +20,7 @@ void HostTimeFilter::add(std::int64_t sensor_ns, std::int64_t receive_ns) {
     // What is held back is added to the host's clock as if it had never been set back.
     const std::int64_t offset_ns = receive_ns + held_back_ns_ - sensor_ns;
     if (!initialized_) {
+        begin_sensor_ns_ = sensor_ns;
         restart(sensor_ns, offset_ns);
         return;
     }
@@ -30,6 +31,12 @@ void HostTimeFilter::add(std::int64_t sensor_ns, std::int64_t receive_ns) {
     if (excess_s < -static_cast<double>(kStepNs) * 1e-9) {
         // Earlier than physics allows: the host's clock was set back, or the sensor's forward.
         const auto by_ns = static_cast<std::int64_t>(std::llround(excess_s * 1e9));
+        const std::int64_t age_ns = sensor_ns - begin_sensor_ns_;
+        if (-by_ns <= kStepHoldNs && age_ns >= 0 && age_ns <= kStepHoldNs) {
+            // Or all before it were delayed: a stream often begins with a burst.
+            restart(sensor_ns, offset_ns);
+            return;
+        }
         const std::int64_t host_before = to_host_ns(sensor_ns);
         const bool goes_back = last_stamp_ns_ != INT64_MIN && host_before + by_ns <= last_stamp_ns_;
         step_ = {true, by_ns, !goes_back};
@@ -115,8 +122,14 @@ std::int64_t HostTimeFilter::to_host_ns(std::int64_t sensor_ns) const {
 
 std::int64_t HostTimeFilter::next_stamp_ns(std::int64_t sensor_ns) {
     std::int64_t stamp = to_host_ns(sensor_ns);
-    if (last_stamp_ns_ != INT64_MIN) stamp = std::max(stamp, last_stamp_ns_ + 1000);  // utime counts microseconds
+    if (last_stamp_ns_ != INT64_MIN) {
+        // A correction downwards is made up for little by little: who divides by the time between two stamps gets
+        // something sensible.
+        const std::int64_t since_ns = std::clamp<std::int64_t>(sensor_ns - last_sensor_ns_, 0, kStepHoldNs);
+        stamp = std::max(stamp, last_stamp_ns_ + std::max<std::int64_t>(since_ns / 2, 1000));  // utime: microseconds
+    }
     last_stamp_ns_ = stamp;
+    last_sensor_ns_ = sensor_ns;
     return stamp;
 }
 

@@ -30,7 +30,8 @@ class HostTimeFilter {
     /// Host time of a sensor time; valid once ready(). Does not depend on the order of calls.
     std::int64_t to_host_ns(std::int64_t sensor_ns) const;
 
-    /// As to_host_ns, and later than every result before it: for the stamps of successive frames.
+    /// As to_host_ns, and later than every result before it, by half the sensor's own time between the two or more:
+    /// for the stamps of successive frames.
     std::int64_t next_stamp_ns(std::int64_t sensor_ns);
 
     /// A filter for a sensor with another clock, whose stamps go on where this one's end.
@@ -58,6 +59,7 @@ class HostTimeFilter {
     double predicted_offset_s(double sensor_s) const { return intercept_ + slope_ * (sensor_s - pivot_s_); }
 
     bool initialized_ = false;
+    std::int64_t begin_sensor_ns_ = 0;  ///< of the stream: until the hold time is over, all may have been delayed
     std::int64_t epoch_sensor_ns_ = 0;
     std::int64_t base_offset_ns_ = 0;
     std::array<Minimum, kIntervals> minima_{};
@@ -72,6 +74,7 @@ class HostTimeFilter {
     bool above_ = false;
     std::int64_t held_back_ns_ = 0;  // a backward step of the host's clock that is not followed
     std::int64_t last_stamp_ns_ = INT64_MIN;
+    std::int64_t last_sensor_ns_ = 0;  // of that stamp
     Step step_;
 };
 

@@ -52,7 +52,8 @@ void LiveService::run() {
             signals_.wait(session_ ? session_->done_descriptor() : -1, std::clamp(left, milliseconds(0), kLookPeriod)));
         if (session_ && session_->done()) end_session();
         if (Clock::now() < next_report) continue;
-        next_report += kReportPeriod;
+        // After a standstill (SIGSTOP, say) what was missed is not made up for.
+        next_report = std::max(next_report + kReportPeriod, Clock::now());
         report();
     }
 }

@@ -12,13 +12,20 @@ namespace dlod::daemon {
 namespace {
 
 constexpr std::size_t kBufferBytes = 64 * 1024;
+constexpr std::size_t kPageBytes = 4096;  // what a hole is made of
 
 [[noreturn]] void fail(const std::filesystem::path& path, const char* what, int error) {
     throw OutputError(fmt::format("{}: cannot {}: {}", path.string(), what, std::strerror(error)));
 }
 
+bool is_zero(std::span<const std::byte> bytes) {
+    return bytes.empty() ||
+           (bytes.front() == std::byte{0} && std::memcmp(bytes.data(), bytes.data() + 1, bytes.size() - 1) == 0);
+}
+
 std::filesystem::path path_to_write(const std::filesystem::path& target, OutputFile::Mode mode) {
-    return mode == OutputFile::Mode::kInPlace ? target : std::filesystem::path(target.string() + ".part");
+    return mode == OutputFile::Mode::kInPlace ? target
+                                              : std::filesystem::path(target.string() + OutputFile::kPartSuffix);
 }
 
 }  // namespace
@@ -52,6 +59,25 @@ void OutputFile::write(std::span<const std::byte> bytes) {
     } else {
         buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
     }
+}
+
+void OutputFile::write_sparse(std::span<const std::byte> bytes) {
+    flush();
+    std::size_t begin = 0;
+    while (begin + kPageBytes < bytes.size() && is_zero(bytes.subspan(begin, kPageBytes))) begin += kPageBytes;
+    // The last page is written, whatever is in it: it gives the file its length.
+    const std::size_t last = bytes.empty() ? 0 : (bytes.size() - 1) / kPageBytes * kPageBytes;
+    std::size_t end = last;
+    while (end > begin && is_zero(bytes.subspan(end - kPageBytes, kPageBytes))) end -= kPageBytes;
+    skip(bytes.first(begin));
+    write_through(bytes.subspan(begin, end - begin));
+    skip(bytes.subspan(end, last - end));
+    write_through(bytes.subspan(last));
+}
+
+void OutputFile::skip(std::span<const std::byte> zeros) {
+    if (zeros.empty() || ::lseek(descriptor_, static_cast<off_t>(zeros.size()), SEEK_CUR) >= 0) return;
+    write_through(zeros);
 }
 
 void OutputFile::flush() {

@@ -24,6 +24,8 @@ class OutputFile {
         /// close() it stays for good.
         kReplace,
     };
+    /// Of the name under which a file waits that will replace another.
+    static constexpr const char* kPartSuffix = ".part";
 
     /// Creates or truncates. @throws OutputError
     explicit OutputFile(std::filesystem::path path, Mode mode = Mode::kInPlace);
@@ -34,6 +36,9 @@ class OutputFile {
     /// @throws OutputError
     void write(std::string_view text) { write(std::as_bytes(std::span(text))); }
     void write(std::span<const std::byte> bytes);
+    /// The same for an image that begins or ends with many zeros: they become a hole of the file, which reads as zeros
+    /// and costs neither time nor space, where it can have any. @throws OutputError
+    void write_sparse(std::span<const std::byte> bytes);
     /// Hands everything to the system and closes. Without it the destructor does so in place, but cannot report a
     /// failure.
     /// @throws OutputError
@@ -45,6 +50,7 @@ class OutputFile {
   private:
     void flush();
     void write_through(std::span<const std::byte> bytes);
+    void skip(std::span<const std::byte> zeros);
     void put_in_place();
     bool replaces() const { return path_ != target_; }
 

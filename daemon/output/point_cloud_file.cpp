@@ -27,18 +27,21 @@ void write_finite(OutputFile& file, std::span<const MapPoint> points) {
 
 }  // namespace
 
-void write_pcd(OutputFile& file, std::span<const MapPoint> points) {
+void write_pcd(OutputFile& file, std::span<const MapPoint> points, std::string_view comment) {
+    file.write("# .PCD v0.7 - Point Cloud Data file format\n");
+    if (!comment.empty()) file.write(fmt::format("# {}\n", comment));
     file.write(
-        fmt::format("# .PCD v0.7 - Point Cloud Data file format\n"
-                    "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {0}\nHEIGHT 1\n"
+        fmt::format("VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {0}\nHEIGHT 1\n"
                     "VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {0}\nDATA binary\n",
                     count_finite(points)));
     write_finite(file, points);
 }
 
-void write_ply(OutputFile& file, std::span<const MapPoint> points) {
+void write_ply(OutputFile& file, std::span<const MapPoint> points, std::string_view comment) {
+    file.write("ply\nformat binary_little_endian 1.0\ncomment metres, z up\n");
+    if (!comment.empty()) file.write(fmt::format("comment {}\n", comment));
     file.write(
-        fmt::format("ply\nformat binary_little_endian 1.0\ncomment metres, z up\nelement vertex {}\n"
+        fmt::format("element vertex {}\n"
                     "property float x\nproperty float y\nproperty float z\nend_header\n",
                     count_finite(points)));
     write_finite(file, points);

@@ -69,7 +69,7 @@ void ResultWriter::write(PipelineFrame& frame) {
         const StepTimer timer(frame.times, Step::kWrite);
         if (frame.odometry.valid) write_pose(frame);
         labels_.write(bytes_of(frame.detection.label));
-        instances_.write(bytes_of(frame.detection.instance));
+        instances_.write_sparse(bytes_of(frame.detection.instance));
         write_tracks(frame);
     }
     write_row(frame);

@@ -14,6 +14,8 @@ void prefer_huge_pages() {
     constexpr int kLargestThreshold_bytes = 32 << 20;  // glibc takes no larger one
     constexpr int kReserved_bytes = 256 << 20;         // of addresses; memory is taken when it is used
     constexpr std::uintptr_t kHugePage_bytes = 2 << 20;
+    // One heap for all threads: those of their own would lie elsewhere.
+    ::mallopt(M_ARENA_MAX, 1);
     ::mallopt(M_MMAP_THRESHOLD, kLargestThreshold_bytes);
     ::mallopt(M_TRIM_THRESHOLD, 2 * kReserved_bytes);
     ::mallopt(M_TOP_PAD, kReserved_bytes);

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "driver/network_address.hpp"
+#include "driver/printable.hpp"
 
 namespace dlod::daemon {
 namespace {
@@ -20,34 +21,47 @@ constexpr const char* kMetadataPath = "/api/v1/sensor/metadata";
 constexpr const char* kActiveSettingsPath = "/api/v1/sensor/cmd/get_config_param?args=active";
 constexpr const char* kConfigPath = "/api/v1/sensor/config?reinit=true&persist=false";
 constexpr std::size_t kMaxAnswer = 4U << 20U;  // metadata are about 10 kB
+constexpr int kMostTimeouts = 5;               // for an answer that comes little by little
 
-httplib::Client connect(const std::string& host, std::chrono::milliseconds timeout) {
+/// The body of a good answer, else a SensorError that says what the sensor said. Reads no more than an Ouster would
+/// send, for no longer than it could take.
+std::string request(const std::string& host, std::chrono::milliseconds timeout, const std::string& method,
+                    const std::string& path, const std::string& body = "") {
     httplib::Client client("http://" + host);
     client.set_connection_timeout(timeout);
     client.set_read_timeout(timeout);
     client.set_write_timeout(timeout);
-    return client;
-}
+    httplib::Request request;
+    request.method = method;
+    request.path = path;
+    request.body = body;
+    if (!body.empty()) request.set_header("Content-Type", "application/json");
+    std::string answer;
+    const auto deadline = std::chrono::steady_clock::now() + kMostTimeouts * timeout;
+    request.content_receiver = [&](const char* data, std::size_t size, std::uint64_t, std::uint64_t) {
+        answer.append(data, size);
+        return answer.size() <= kMaxAnswer && std::chrono::steady_clock::now() < deadline;
+    };
+    const httplib::Result result = client.send(request);
 
-/// The body of a good answer, else a SensorError that says what the sensor said.
-std::string body_of(const httplib::Result& result, const std::string& host, const std::string& request) {
-    const std::string what = "sensor " + host + ": " + request;
+    const std::string what = "sensor " + host + ": " + method + " " + path;
+    if (answer.size() > kMaxAnswer) throw SensorError(what + ": answer too large to be an Ouster's");
     if (!result) {
         throw SensorError(what + ": " + httplib::to_string(result.error()) +
                           " (is the sensor powered and connected, and sensor.host right?)");
     }
     if (result->status != 200) {
-        throw SensorError(what + ": status " + std::to_string(result->status) + " " + result->body.substr(0, 200));
+        throw SensorError(what + ": status " + std::to_string(result->status) + " " + driver::printable(answer));
     }
-    if (result->body.size() > kMaxAnswer) throw SensorError(what + ": answer too large to be an Ouster's");
-    return result->body;
+    return answer;
 }
 
 /// Metadata carry the sensor's state: nested in `sensor_info`, or at the top in the flat form.
 std::string state_of(const json& metadata) {
     const json& info = metadata.contains("sensor_info") ? metadata["sensor_info"] : metadata;
-    return info.is_object() && info.contains("status") && info["status"].is_string() ? info["status"].get<std::string>()
-                                                                                     : "RUNNING";
+    return info.is_object() && info.contains("status") && info["status"].is_string()
+               ? driver::printable(info["status"].get_ref<const std::string&>())
+               : "RUNNING";
 }
 
 /// Calls `visit` with the name of each setting in the sensor's API and the member for it.
@@ -75,8 +89,7 @@ SensorClient::SensorClient(std::string host, std::chrono::milliseconds timeout)
     : host_(std::move(host)), timeout_(timeout) {}
 
 std::string SensorClient::fetch_metadata() const {
-    auto client = connect(host_, timeout_);
-    std::string text = body_of(client.Get(kMetadataPath), host_, std::string("GET ") + kMetadataPath);
+    std::string text = request(host_, timeout_, "GET", kMetadataPath);
     const json metadata = json::parse(text, nullptr, /*allow_exceptions=*/false);
     if (!metadata.is_object()) {
         throw SensorError("sensor " + host_ + ": GET " + kMetadataPath +
@@ -90,8 +103,7 @@ std::string SensorClient::fetch_metadata() const {
 }
 
 SensorSettings SensorClient::fetch_settings() const {
-    auto client = connect(host_, timeout_);
-    const std::string text = body_of(client.Get(kActiveSettingsPath), host_, std::string("GET ") + kActiveSettingsPath);
+    const std::string text = request(host_, timeout_, "GET", kActiveSettingsPath);
     const json answer = json::parse(text, nullptr, /*allow_exceptions=*/false);
     SensorSettings settings;
     if (!answer.is_object()) return settings;
@@ -100,14 +112,14 @@ SensorSettings SensorClient::fetch_settings() const {
         if (!answer.contains(name)) return;
         const json& value = answer[name];
         if constexpr (std::is_same_v<Value, std::string>) {
-            if (value.is_string()) setting = value.template get<std::string>();
+            if (value.is_string()) setting = driver::printable(value.template get_ref<const std::string&>());
         } else {
             if (value.is_number_unsigned()) setting = value.template get<Value>();
         }
     });
     // Firmware before 2.0 calls it so.
     if (!settings.udp_dest && answer.contains("udp_ip") && answer["udp_ip"].is_string()) {
-        settings.udp_dest = answer["udp_ip"].get<std::string>();
+        settings.udp_dest = driver::printable(answer["udp_ip"].get_ref<const std::string&>());
     }
     return settings;
 }
@@ -136,9 +148,7 @@ std::string SensorClient::own_address() const {
 }
 
 void SensorClient::apply(const SensorSettings& settings) const {
-    auto client = connect(host_, timeout_);
-    body_of(client.Post(kConfigPath, to_json(settings).dump(), "application/json"), host_,
-            std::string("POST ") + kConfigPath);
+    request(host_, timeout_, "POST", kConfigPath, to_json(settings).dump());
 }
 
 SensorSettings difference(const SensorSettings& wanted, const SensorSettings& active, const std::string& own_address) {

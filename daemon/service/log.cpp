@@ -17,7 +17,8 @@ void set_up_log(int level) {
 
 bool RepeatedWarnings::warn(const std::string& kind, const std::string& message, Clock::time_point now) {
     const std::lock_guard lock(mutex_);
-    const auto [entry, first] = kinds_.try_emplace(kind);
+    const bool too_many = kinds_.size() >= kMostKinds && !kinds_.contains(kind);
+    const auto [entry, first] = kinds_.try_emplace(too_many ? "any other" : kind);
     auto& state = entry->second;
     if (!first && now - state.written < interval_) {
         ++state.held_back;

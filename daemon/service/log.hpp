@@ -16,9 +16,10 @@ void set_up_log(int level);
 class RepeatedWarnings {
   public:
     using Clock = std::chrono::steady_clock;
+    static constexpr std::size_t kMostKinds = 100;  ///< memory and log stay bounded, whatever a sensor says
     explicit RepeatedWarnings(std::chrono::seconds interval = std::chrono::seconds(10)) : interval_(interval) {}
 
-    /// @param kind what counts as the same warning
+    /// @param kind what counts as the same warning; those beyond the first kMostKinds count as one
     /// @return true where it was written
     bool warn(const std::string& kind, const std::string& message, Clock::time_point now = Clock::now());
 

@@ -2,13 +2,25 @@
 
 #include <systemd/sd-daemon.h>
 
+#include <algorithm>
+
 namespace dlod::daemon {
 
+namespace {
+
+/// A new line would begin another message to systemd; a status may hold what a sensor says.
+std::string as_one_line(std::string text) {
+    std::replace(text.begin(), text.end(), '\n', ' ');
+    return text;
+}
+
+}  // namespace
+
 void ServiceNotifier::ready(const std::string& status) const {
-    ::sd_notifyf(0, "READY=1\nSTATUS=%s", status.c_str());
+    ::sd_notifyf(0, "READY=1\nSTATUS=%s", as_one_line(status).c_str());
 }
 void ServiceNotifier::status(const std::string& status) const {
-    ::sd_notifyf(0, "STATUS=%s", status.c_str());
+    ::sd_notifyf(0, "STATUS=%s", as_one_line(status).c_str());
 }
 void ServiceNotifier::watchdog() const {
     ::sd_notify(0, "WATCHDOG=1");

@@ -162,13 +162,19 @@ void StatusBoard::compose_health(std::int64_t last_packet_ns, std::int64_t now_n
     }
     if (!sensor_trouble_.empty()) losses += (losses.empty() ? "" : "; ") + sensor_trouble_;
     const std::int64_t packet_age_ns = now_ns - (last_packet_ns == 0 ? start_ns_ : last_packet_ns);
-    const bool pose_is_old = status_.pose_age < 0 ? now_ns - start_ns_ > kSilence : 1000 * status_.pose_age > kSilence;
-    if (last_packet_ns == 0 || packet_age_ns > kSilence) {
+    const bool silent = last_packet_ns == 0 || packet_age_ns > kSilence;
+    if (silent) {
+        packets_since_ns_ = 0;
+    } else if (packets_since_ns_ == 0) {
+        packets_since_ns_ = now_ns;
+    }
+    const std::int64_t pose_ns = status_.pose_age < 0 ? 0 : now_ns - 1000 * status_.pose_age;
+    if (silent) {
         status_.health = status_t::WAITING;
         status_.health_text = fmt::format(
             "no packets for {} s: {}", packet_age_ns / kSecond,
             sensor_trouble_.empty() ? "check the sensor's power, cable and UDP destination" : sensor_trouble_);
-    } else if (pose_is_old) {
+    } else if (now_ns - std::max(pose_ns, packets_since_ns_) > kSilence) {
         status_.health = status_t::FAULT;
         status_.health_text = "packets arrive but no valid pose: " + (losses.empty() ? "the odometry is lost" : losses);
     } else {

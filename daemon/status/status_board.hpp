@@ -55,6 +55,7 @@ class StatusBoard {
     std::map<std::string, std::uint64_t> previous_counters_;
     std::map<std::string, std::int64_t> rose_ns_;  ///< when a counter of losses was last seen to have risen
     std::uint64_t previous_poses_ = 0;
+    std::int64_t packets_since_ns_ = 0;  ///< when they were first seen after silence; 0: there are none
     std::string sensor_trouble_;
     mutable std::mutex status_mutex_;  ///< guards status_
     status_t status_{};

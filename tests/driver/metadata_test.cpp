@@ -179,6 +179,14 @@ TEST(Metadata, WhatIsNotNeededIsAWarning) {
     EXPECT_EQ(info.serial(), 0U);
 }
 
+TEST(Metadata, TextsAreFitForTheLog) {
+    json metadata = json::parse(synthetic_metadata({}));
+    metadata["sensor_info"]["build_rev"] = "v3.1.0\nMAINPID=1\x1b[31m\u00e9" + std::string(100'000, 'x');
+    const SensorInfo info = parse_metadata(metadata.dump(), "some.json");
+    EXPECT_TRUE(info.firmware.starts_with("v3.1.0?MAINPID=1?[31m?")) << info.firmware;
+    EXPECT_LT(info.firmware.size(), 110U);
+}
+
 TEST(Metadata, ReducedFilesGetTheDefaultsOfTheirProductLine) {
     struct Expected {
         std::string product_line;

@@ -16,6 +16,17 @@ constexpr std::array kShare{0.4, 0.2, 0.2, 0.2};
 /// Surfaces closer together than this along a beam give one pulse, a mixed pixel.
 constexpr float kPulse_m = 0.45F;
 
+// What rough measurements are like: deviations of the beams from their calibration (data sheets promise no less),
+// shares of the light that a leaf lets through and of the beams that meet dust, rain or an insect.
+constexpr double kAngleDeviation_rad = 3e-4;
+constexpr double kRangeDeviation_m = 0.01;
+constexpr double kLeafPasses = 0.4;
+constexpr int kMostLeaves = 3;
+constexpr double kFlutter_m = 0.04;
+constexpr double kStray = 2e-4;
+constexpr double kNearestStray_m = 0.5;
+constexpr double kFarthestStray_m = 12.0;
+
 /// A still movable object, in the truth (README of the truth folder); the product's own 3 means something else.
 constexpr std::uint8_t kAtRest = 3;
 
@@ -57,8 +68,11 @@ Lidar::Lidar(const driver::SensorInfo& sensor, const World& world, double durati
     const double rim = options.noise ? 0.35 * optics_.divergence_rad : 0.0;
     for (int row = 0; row < model.height; ++row) {
         const auto r = static_cast<std::size_t>(row);
-        const double azimuth = -static_cast<double>(model.azimuth_offset_rad[r]);
-        const double altitude = static_cast<double>(model.altitude_rad[r]);
+        Random random(options.seed, 0xBEA3, r);
+        const auto off = [&](double deviation) { return options.rough ? deviation * random.normal() : 0.0; };
+        const double azimuth = -static_cast<double>(model.azimuth_offset_rad[r]) + off(kAngleDeviation_rad);
+        const double altitude = static_cast<double>(model.altitude_rad[r]) + off(kAngleDeviation_rad);
+        bias_m_.push_back(static_cast<float>(off(kRangeDeviation_m)));
         Beam beam{};
         for (int i = 0; i < kSubRays; ++i) {
             const double angle = 2.0 * std::numbers::pi * i / (kSubRays - 1);
@@ -149,6 +163,45 @@ void Lidar::measure(const Hit* hits, Random& random, Echo& first, Echo& second) 
     }
 }
 
+/// Light that a leaf let through goes on to what is behind.
+void Lidar::pass_leaves(const RayCaster& caster, const RayBundle& rays, Random& random, Hit hits[kRaysPerCast]) const {
+    bool passes[kRaysPerCast];
+    std::fill(std::begin(passes), std::end(passes), true);
+    for (int leaf = 0; leaf < kMostLeaves; ++leaf) {
+        RayBundle behind = rays;
+        bool any = false;
+        for (int i = 0; i < kRaysPerCast; ++i) {
+            passes[i] = passes[i] && hits[i].distance_m > 0.0F && hits[i].material == Material::kFoliage &&
+                        random.chance(kLeafPasses);
+            any = any || passes[i];
+            if (passes[i]) behind.origin[i] += hits[i].distance_m * rays.direction[i];
+        }
+        if (!any) return;
+        std::array<Hit, kRaysPerCast> farther;
+        caster.cast(behind, farther.data());
+        for (int i = 0; i < kRaysPerCast; ++i) {
+            const auto& hit = farther[static_cast<std::size_t>(i)];
+            if (!passes[i]) continue;
+            const float before = hits[i].distance_m;
+            hits[i] = hit;
+            if (hit.distance_m > 0.0F) hits[i].distance_m += before;
+        }
+    }
+}
+
+/// Leaves flutter; now and then something in the air is met.
+void Lidar::scatter(Random& random, Echo& echo) const {
+    if (echo.energy > 0.0F && echo.material == Material::kFoliage && echo.object == 0) {
+        echo.distance_m += static_cast<float>(kFlutter_m * random.normal());
+    }
+    if (random.chance(kStray)) {
+        echo = {.distance_m = static_cast<float>(random.uniform(kNearestStray_m, kFarthestStray_m)),
+                .energy = 1.0F,
+                .reflectivity = 0.05F,
+                .material = Material::kFoliage};
+    }
+}
+
 void Lidar::scan(int index, RayCaster& caster, Scan& scan) const {
     const SensorModel& model = sensor_.model;
     const int H = model.height;
@@ -200,6 +253,11 @@ void Lidar::scan(int index, RayCaster& caster, Scan& scan) const {
                         .cast<float>();
             }
             caster.cast(rays, hits.data());
+            if (options_.rough) {
+                Random random(options_.seed ^ 0x1EAF, static_cast<std::uint64_t>(index),
+                              static_cast<std::uint64_t>(m) * 256U + static_cast<std::uint64_t>(row));
+                pass_leaves(caster, rays, random, hits.data());
+            }
             for (int b = 0; b < beams; ++b) {
                 const int r = row + b;
                 const int column = (((m + model.pixel_shift[static_cast<std::size_t>(r)]) % W) + W) % W;
@@ -209,6 +267,7 @@ void Lidar::scan(int index, RayCaster& caster, Scan& scan) const {
                 Echo first;
                 Echo second;
                 measure(&centre, random, first, second);
+                if (options_.rough) scatter(random, first);
 
                 const Vec3 ray = turn * beams_[static_cast<std::size_t>(r)].direction[0];
                 const float sun = centre.distance_m == 0.0F ? static_cast<float>(900.0 + 700.0 * ray.z())
@@ -220,7 +279,8 @@ void Lidar::scan(int index, RayCaster& caster, Scan& scan) const {
                 const auto store = [&](Echo& echo, ReturnImages& images) {
                     if (echo.energy <= 0.0F) return;
                     // Sensors report the distance from their axis, along the beam.
-                    const double range_mm = (static_cast<double>(echo.distance_m) + origin_m) * 1e3;
+                    const auto bias_m = static_cast<double>(bias_m_[static_cast<std::size_t>(r)]);
+                    const double range_mm = (static_cast<double>(echo.distance_m) + bias_m + origin_m) * 1e3;
                     const auto steps = static_cast<std::uint32_t>(std::lround(range_mm / range_step_mm_));
                     if (steps * range_step_mm_ > range_limit_mm_) return;
                     images.range_mm(r, column) = steps * range_step_mm_;

@@ -25,7 +25,8 @@ LidarOptics optics_of(const std::string& product_line);
 
 struct LidarOptions {
     std::uint64_t seed = 1;
-    bool noise = true;  ///< false: exact ranges, no dropouts, beams without width
+    bool noise = true;   ///< false: exact ranges, no dropouts, beams without width
+    bool rough = false;  ///< leaves let light through and flutter, beams are not quite calibrated, stray returns
 };
 
 /// One return of each pixel; destaggered images.
@@ -67,7 +68,9 @@ class Lidar {
         std::array<Eigen::Vector3d, kSubRays> direction;  ///< in the lidar frame at encoder angle 0
     };
     struct Echo;
+    void pass_leaves(const RayCaster& caster, const RayBundle& rays, Random& random, Hit hits[kRaysPerCast]) const;
     void measure(const Hit* hits, Random& random, Echo& first, Echo& second) const;
+    void scatter(Random& random, Echo& echo) const;
 
     driver::SensorInfo sensor_;
     const World& world_;
@@ -77,6 +80,7 @@ class Lidar {
     std::uint32_t range_limit_mm_;
     int rays_a_beam_;
     std::vector<Beam> beams_;       ///< [H]
+    std::vector<float> bias_m_;     ///< [H] what a beam's ranges are off by
     std::vector<bool> ever_moves_;  ///< [actors]
 };
 

@@ -42,6 +42,7 @@ struct Options {
     std::string mode;
     int frames = 0;
     bool no_noise = false;
+    bool rough = false;
     bool start_moving = false;
     bool no_wobble = false;
     bool fragments = false;
@@ -143,6 +144,10 @@ void add_options(CLI::App& app, Options& o) {
     app.add_option("--profile", o.profile, "lidar profile, such as RNG15_RFL8_NIR8; default: as in the metadata");
     app.add_option("--mode", o.mode, "columns and rate, such as 2048x10; default: as in the metadata");
     app.add_flag("--no-noise", o.no_noise, "exact ranges, no dropouts, no mixed pixels, a perfect IMU");
+    app.add_flag("--rough", o.rough,
+                 "as outdoors: leaves let beams through and flutter, beams are off from their calibration by some "
+                 "millimetres and hundredths of a degree, stray returns")
+        ->excludes("--no-noise");
     app.add_flag("--fragments", o.fragments, "the capture holds IPv4 fragments instead of jumbo frames");
 
     app.add_option("--loss", o.faults.loss, "share of the lidar packets that are lost")->check(CLI::Range(0.0, 1.0));
@@ -217,7 +222,8 @@ int run(Options& o) {
     const auto began = std::chrono::steady_clock::now();
     const auto scene = std::find_if(scenes().begin(), scenes().end(), [&](const auto& s) { return s.name == o.scene; });
     const World world = scene->build(o.world);
-    const Lidar lidar(sensor, world, o.world.duration_s, {.seed = o.world.seed, .noise = !o.no_noise});
+    const Lidar lidar(sensor, world, o.world.duration_s,
+                      {.seed = o.world.seed, .noise = !o.no_noise, .rough = o.rough});
     const ImuSimulator imu(world.robot, sensor.model, o.world.seed, !o.no_noise);
     PacketStream stream(sensor, imu, o.world.duration_s, o.world.seed, o.faults);
 
@@ -258,6 +264,7 @@ int run(Options& o) {
                        .profile = sensor.profile_name,
                        .faults = describe(o.faults),
                        .noise = !o.no_noise,
+                       .rough = o.rough,
                        .fragments = o.fragments});
     }
     if (pcap && !pcap->flush()) throw std::runtime_error(pcap->error());

@@ -202,6 +202,7 @@ void TruthWriter::finish(const ImuSimulator& imu, double duration_s, const Drive
                         {"width", model.width},
                         {"profile", drive.profile},
                         {"noise", drive.noise},
+                        {"rough", drive.rough},
                         {"motion_distortion", true},
                         {"fragment", drive.fragments},
                         {"faults", nlohmann::json::parse(drive.faults)},

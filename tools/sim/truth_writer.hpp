@@ -22,6 +22,7 @@ struct DriveDescription {
     std::string profile;
     std::string faults;  ///< JSON object
     bool noise = true;
+    bool rough = false;
     bool fragments = false;
 };
 

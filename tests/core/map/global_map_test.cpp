@@ -105,6 +105,22 @@ TEST_F(GlobalMapTest, FramesWithoutAPoseAndFarPointsStayOut) {
     EXPECT_TRUE(map.points().empty());
 }
 
+TEST_F(GlobalMapTest, AScanThatTurnsOutToBeVoidStaysOut) {
+    GlobalMap map(sensor, config);
+    see_wall(4.0);
+    const std::int64_t first_ns = scene.frame.header.stamp_ns;
+    map.update(scene.frame);
+    for (int k = 0; k < 20; ++k) {
+        see_wall(5.0);
+        if (k == 0) scene.frame.odometry.void_scan_ns = first_ns;
+        map.update(scene.frame);
+        scene.frame.odometry.void_scan_ns.reset();
+    }
+    map.finish();
+    EXPECT_EQ(count_at(map, 4.0), 0);
+    EXPECT_GT(count_at(map, 5.0), 0);
+}
+
 TEST_F(GlobalMapTest, HoldsNothingThatNoFrameShowed) {
     config.confirm_s = 0.0;
     GlobalMap map(sensor, config);

@@ -114,6 +114,29 @@ TEST_P(MovingStart, FindsSixMetresASecondToo) {
     }
 }
 
+// Nothing that was learnt from a scan that was deskewed for another motion than it had may be kept.
+TEST_P(MovingStart, TheFirstScanIsVoidWhereItWasInMotion) {
+    OdometryConfig config;
+    config.use_imu = GetParam();
+    for (const double speed_mps : {0.0, 3.0}) {
+        SCOPED_TRACE(speed_mps);
+        SimulatedDrive drive(furnished_room(), [&](double t) { return pose_of(speed_mps * t - 2.0, -1.0, 0.0, 0.2); });
+        OdometryRun run(drive, config);
+        run.step(0);
+        EXPECT_FALSE(run.frame().odometry.void_scan_ns.has_value());
+        const std::int64_t first_ns = run.frame().header.stamp_ns;
+        run.step(1);
+        if (speed_mps > 0.0) {
+            EXPECT_EQ(run.frame().odometry.void_scan_ns, first_ns);
+            EXPECT_TRUE(run.frame().odometry.earlier_is_void());
+        } else {
+            EXPECT_FALSE(run.frame().odometry.earlier_is_void());
+        }
+        run.step(2);
+        EXPECT_FALSE(run.frame().odometry.earlier_is_void());
+    }
+}
+
 INSTANTIATE_TEST_SUITE_P(Odometry, MovingStart, testing::Bool());
 
 TEST(Odometry, SurvivesTurnsOfFiveRadiansASecond) {

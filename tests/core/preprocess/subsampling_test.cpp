@@ -31,6 +31,9 @@ Eigen::Vector3f normal(const PointSelection& points, std::size_t i) {
     return {points.nx[i], points.ny[i], points.nz[i]};
 }
 
+/// Of the simulated sensor, whose beams' azimuths span 0.1 rad, in columns.
+constexpr double kMostColumnsApart = 20.0;
+
 /// One frame of a room, taken at rest.
 struct Room {
     explicit Room(const DriveOptions& options, std::vector<SceneBox> scene = furnished_room())
@@ -91,15 +94,17 @@ TEST_P(Resolutions, EveryPointKnowsThePixelThatItComesFrom) {
         const double time_s =
             static_cast<double>(room.frame.columns.time_ns[static_cast<std::size_t>(m)] - room.frame.header.stamp_ns) *
             1e-9;
-        EXPECT_NEAR(static_cast<double>(points.time_s[i]), time_s, 1e-6);
+        // That of a window is a mean over its rows, which are fired some columns apart.
+        EXPECT_NEAR(static_cast<double>(points.time_s[i]), time_s,
+                    normal(points, i).isZero() ? 1e-6 : kMostColumnsApart * 0.1 / width);
         EXPECT_LE(points.time_s[i], 0.0F);
         const Eigen::Vector3f shift = selected_point(points, i) - pixel_point(room.frame, p);
         if (normal(points, i).isZero()) {
             EXPECT_EQ(shift.norm(), 0.0F);
         } else {
-            // Smoothed along its beam, by about the noise.
+            // Smoothed along its beam, by about the noise; across it, the mean of its beams' origins counts.
             EXPECT_LT(shift.norm(), 0.08F);
-            EXPECT_LT(shift.cross(pixel_point(room.frame, p).normalized()).norm(), 2e-3F);
+            EXPECT_LT(shift.cross(pixel_point(room.frame, p).normalized()).norm(), 5e-3F);
             EXPECT_NEAR(normal(points, i).norm(), 1.0F, 1e-4F);
             EXPECT_LT(normal(points, i).dot(selected_point(points, i)), 0.0F);
             EXPECT_GT(points.planarity[i], 0.0F);
@@ -147,7 +152,9 @@ TEST_P(Resolutions, FlatPointsComeFirstAndEachKindInTheOrderOfItsFiring) {
     std::size_t rough = 0;
     while (rough < points.size() && !normal(points, rough).isZero()) ++rough;
     EXPECT_GT(rough, 0U);
-    EXPECT_TRUE(std::is_sorted(points.measurement.begin(), points.measurement.begin() + static_cast<long>(rough)));
+    // Of windows that are fired half between two columns either may come first.
+    const float column_s = 0.1F / static_cast<float>(GetParam().second);
+    for (std::size_t i = 1; i < rough; ++i) EXPECT_GT(points.time_s[i], points.time_s[i - 1] - 1.01F * column_s);
     EXPECT_TRUE(std::is_sorted(points.measurement.begin() + static_cast<long>(rough), points.measurement.end()));
     for (std::size_t i = rough; i < points.size(); ++i) EXPECT_TRUE(normal(points, i).isZero());
 }

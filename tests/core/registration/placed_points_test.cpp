@@ -3,9 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <random>
+#include <vector>
 
+#include "core/preprocess/subsampling.hpp"
 #include "tests/core/registration/sweeps.hpp"
+#include "tests/support/simulated_drive.hpp"
 
 namespace dlod::test {
 namespace {
@@ -30,6 +34,7 @@ PointSelection random_points(std::size_t count, double duration_s, bool in_order
         points.nz.push_back(n.z());
         points.planarity.push_back(1.0F);
         points.time_s.push_back(times[i]);
+        for (auto* gradient : {&points.tx, &points.ty, &points.tz}) gradient->push_back(0.0F);
     }
     return points;
 }
@@ -80,6 +85,69 @@ TEST(PlacedPoints, BeforeTheFirstKnotAndAfterTheLastTheirPosesHold) {
     place(points, motion, placed);
     EXPECT_LT(largest_error(points, placed, [&](double t) { return interpolated(motion, std::clamp(t, -0.1, 0.0)); }),
               3e-5);
+}
+
+/// Distance from a face of one of the boxes, and its normal.
+struct Face {
+    double distance_m = 1e9;
+    Eigen::Vector3d normal;
+};
+
+Face nearest_face(const std::vector<SceneBox>& scene, const Eigen::Vector3d& p) {
+    Face nearest;
+    for (const SceneBox& box : scene) {
+        for (int axis = 0; axis < 3; ++axis) {
+            for (const double side : {box.low[axis], box.high[axis]}) {
+                const double distance = std::abs(p[axis] - side);
+                if (distance >= nearest.distance_m) continue;
+                const Eigen::Vector3d outside = (box.low - p).cwiseMax(p - box.high);
+                if (outside.maxCoeff() < 0.05) nearest = {distance, Eigen::Vector3d::Unit(axis)};
+            }
+        }
+    }
+    return nearest;
+}
+
+// The rows of a window are fired milliseconds apart, from origins that lie up to a centimetre apart: neither the place
+// nor the normal that they give may depend on that.
+TEST(PlacedPoints, LieOnTheirSurfacesThoughTheSensorMovesWhileAWindowIsFired) {
+    const std::vector<SceneBox> scene = furnished_room();
+    const Eigen::Vector3d v_mps(5.0, 1.5, 0.5);
+    const auto trajectory = [&](double t) {
+        return make_pose(so3_exp(Eigen::Vector3d(0.02, -0.03, 0.4 + 0.8 * t)),
+                         Eigen::Vector3d(-3, -1, 0.2) + t * v_mps);
+    };
+    DriveOptions options;
+    options.height = 128;
+    options.width = 1024;
+    options.range_noise_m = 0.0;
+    SimulatedDrive drive(scene, trajectory, options);
+    Frame frame(drive.sensor());
+    drive.fill(0, frame);
+    Subsampling(drive.sensor(), SubsamplingConfig{}).process(frame);
+    const double stamp_s = drive.last_stamp_s();
+    PlacedPoints placed;
+    place(frame.prepared.points, sweep_of([&](double t) { return trajectory(stamp_s + t); }, 0.1), placed);
+    std::vector<double> distance_m, angle_rad;
+    for (std::size_t i = 0; i < placed.size(); ++i) {
+        const Eigen::Vector3d n = Eigen::Vector3f(placed.nx[i], placed.ny[i], placed.nz[i]).cast<double>();
+        // Windows across an edge are of no plane.
+        if (n.norm() < 0.5 || n.cwiseAbs().maxCoeff() < 0.98) continue;
+        const Face face = nearest_face(scene, Eigen::Vector3f(placed.x[i], placed.y[i], placed.z[i]).cast<double>());
+        EXPECT_NEAR(n.norm(), 1.0, 0.01);
+        distance_m.push_back(face.distance_m);
+        angle_rad.push_back(n.cross(face.normal).norm());
+    }
+    ASSERT_GT(distance_m.size(), 1000U);
+    const auto quantile = [](std::vector<double> values, double share) {
+        std::sort(values.begin(), values.end());
+        return values[static_cast<std::size_t>(share * static_cast<double>(values.size()))];
+    };
+    EXPECT_LT(quantile(distance_m, 0.5), 0.5e-3);
+    EXPECT_LT(quantile(distance_m, 0.9), 2e-3);
+    // Ranges come in millimetres.
+    EXPECT_LT(quantile(angle_rad, 0.5), 8e-3);
+    EXPECT_LT(quantile(angle_rad, 0.9), 0.03);
 }
 
 TEST(PlacedPoints, NoneAreNone) {

@@ -47,9 +47,8 @@ class DynamicPointsRemovalTest : public ::testing::Test {
             for (auto* v : {&points.nx, &points.ny, &points.planarity, &points.time_s}) v->push_back(0.0F);
             points.nz.push_back(1.0F);
         }
-        for (int r = 0; r < 3; ++r) {
-            std::fill(scene.frame.odometry.deskew[5 * r].begin(), scene.frame.odometry.deskew[5 * r].end(), 1.0F);
-        }
+        const auto& points = scene.frame.prepared.points;
+        scene.frame.odometry.keyframe_points = {points.x, points.y, points.z, points.nx, points.ny, points.nz};
     }
 
     RemovalConfig config;

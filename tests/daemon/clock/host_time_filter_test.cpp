@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <random>
@@ -116,6 +117,53 @@ TEST(HostTimeFilter, APassingDelayIsNoStep) {
     }
     EXPECT_LT(worst_error_ms(filter, sim, 100, 0, 11 * kSecond), 0.5);
     EXPECT_FALSE(filter.take_step().happened);
+}
+
+TEST(HostTimeFilter, ABurstAtTheStartOfAStreamIsNoStep) {
+    // What a network had held back comes at once: the first packets are late by as long as they have waited.
+    for (const std::int64_t held_ns : {51 * kMs, 120 * kMs, 700 * kMs, 1900 * kMs}) {
+        const Simulation sim(0.0, 5);
+        HostTimeFilter filter;
+        std::int64_t last = 0;
+        for (int f = 0; f < 100; ++f) {
+            const std::int64_t host = Simulation::kHostEpoch + f * 100 * kMs;
+            const std::int64_t received = std::max(host, Simulation::kHostEpoch + held_ns);
+            filter.add(sim.sensor_ns(host), received);
+            const std::int64_t stamp = filter.next_stamp_ns(sim.sensor_ns(host));
+            EXPECT_GE(stamp, host);
+            // What was given too late is made up for, but no two stamps come close.
+            EXPECT_TRUE(f == 0 || stamp - last >= 50 * kMs) << stamp - last;
+            EXPECT_TRUE(stamp == host || host < Simulation::kHostEpoch + 2 * held_ns) << held_ns / kMs << " ms, " << f;
+            last = stamp;
+        }
+        EXPECT_FALSE(filter.take_step().happened) << held_ns / kMs << " ms";
+    }
+}
+
+TEST(HostTimeFilter, AClockSetBackByMoreThanAnyDelayIsAStepFromTheStart) {
+    const Simulation sim(0.0, 5);
+    HostTimeFilter filter;
+    for (int f = 0; f < 10; ++f) {
+        const std::int64_t host = Simulation::kHostEpoch + f * 100 * kMs;
+        filter.add(sim.sensor_ns(host), f < 5 ? host : host - 3600 * kSecond);
+        filter.next_stamp_ns(sim.sensor_ns(host));
+    }
+    const auto step = filter.take_step();
+    EXPECT_TRUE(step.happened);
+    EXPECT_NEAR(static_cast<double>(step.by_ns) * 1e-9, -3600.0, 0.1);
+}
+
+TEST(HostTimeFilter, AStepBackLaterOnIsOneHoweverSmall) {
+    Simulation sim(0.0, 5);
+    HostTimeFilter filter;
+    worst_error_ms(filter, sim, 30, 10);
+    for (int f = 30; f < 40; ++f) {
+        const std::int64_t host = Simulation::kHostEpoch + f * 100 * kMs;
+        filter.add(sim.sensor_ns(host), host - 80 * kMs);
+    }
+    const auto step = filter.take_step();
+    EXPECT_TRUE(step.happened);
+    EXPECT_NEAR(static_cast<double>(step.by_ns) * 1e-6, -80.0, 1.0);
 }
 
 }  // namespace

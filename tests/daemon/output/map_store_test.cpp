@@ -128,6 +128,43 @@ TEST(MapStore, WhereOneOfTheTwoCannotBeReplacedNeitherIs) {
     }
 }
 
+TEST(MapStore, TheHeadersTellWhetherTwoFilesAreOfOneMap) {
+    const test::TemporaryFolder folder;
+    const MapStore store({.folder = folder.path().string()});
+    ASSERT_TRUE(store.save("a", points(2)).ok);
+    ASSERT_TRUE(store.save("b", points(3)).ok);
+    const auto checksum = [&](const char* name, const std::string& comment) {
+        const auto file = content(folder.path() / name);
+        const auto at = file.find(comment);
+        return at == std::string::npos ? "none" : file.substr(at + comment.size(), 16);
+    };
+    EXPECT_NE(checksum("a.pcd", "\n# map "), "none");
+    EXPECT_EQ(checksum("a.pcd", "\n# map "), checksum("a.ply", "\ncomment map "));
+    EXPECT_EQ(checksum("b.pcd", "\n# map "), checksum("b.ply", "\ncomment map "));
+    EXPECT_NE(checksum("a.pcd", "\n# map "), checksum("b.pcd", "\n# map "));
+}
+
+TEST(MapStore, AKillBetweenTheTwoIsMadeGoodByTheNextProgram) {
+    const test::TemporaryFolder folder;
+    const auto in = [&](const char* name) { return folder.path() / name; };
+    ASSERT_TRUE(MapStore({.folder = folder.path().string()}).save("new", points(3)).ok);
+    ASSERT_TRUE(MapStore({.folder = folder.path().string()}).save("hall", points(2)).ok);
+    const auto new_ply = content(in("new.ply"));
+    // Killed when hall.pcd had been replaced and hall.ply had not...
+    std::filesystem::copy_file(in("new.pcd"), in("hall.pcd"), std::filesystem::copy_options::overwrite_existing);
+    std::filesystem::rename(in("new.ply"), in("hall.ply.part"));
+    // ... and before either was: what waits may be cut off.
+    const auto old_ply = content(in("hall.ply"));
+    std::filesystem::rename(in("new.pcd"), in("yard.pcd"));
+    std::ofstream(in("yard.ply")) << "what was there";
+    std::ofstream(in("yard.ply.part")) << old_ply.substr(0, old_ply.size() / 2);
+
+    const MapStore next({.folder = folder.path().string()});
+    EXPECT_EQ(content(in("hall.ply")), new_ply);
+    EXPECT_FALSE(std::filesystem::exists(in("hall.ply.part")));
+    EXPECT_EQ(content(in("yard.ply")), "what was there");
+}
+
 TEST(MapStore, AMapWithoutPointsReplacesNone) {
     const test::TemporaryFolder folder;
     const MapStore store({.folder = folder.path().string()});

@@ -114,6 +114,24 @@ TEST(ResultWriter, AFolderThatCannotBeMadeIsNamed) {
     }
 }
 
+TEST(OutputFile, SparseImagesReadBackAsTheyWere) {
+    const test::TemporaryFolder folder;
+    const std::filesystem::path path = folder.path() / "images.bin";
+    std::string expected = "head";
+    OutputFile file(path);
+    file.write(expected);
+    for (const std::size_t size : {std::size_t{0}, std::size_t{100}, std::size_t{4096}, std::size_t{50'000}}) {
+        for (const std::size_t first : {std::size_t{0}, size / 3, size}) {
+            std::string image(size, '\0');
+            for (std::size_t i = first; i < 2 * size / 3; ++i) image[i] = 'x';
+            file.write_sparse(std::as_bytes(std::span(image)));
+            expected += image;
+        }
+    }
+    file.close();
+    EXPECT_EQ(content(path), expected);
+}
+
 TEST(OutputFile, AFullDiskIsAnError) {
     if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
     OutputFile file("/dev/full");

@@ -23,7 +23,11 @@ class FakeSensor {
     FakeSensor() {
         server_.Get("/api/v1/sensor/metadata", [this](const httplib::Request&, httplib::Response& response) {
             response.status = status;
-            response.set_content(metadata, "application/json");
+            if (!endless) return response.set_content(metadata, "application/json");
+            response.set_chunked_content_provider("application/json", [this](std::size_t, httplib::DataSink& sink) {
+                std::this_thread::sleep_for(pause);
+                return sink.write(metadata.data(), metadata.size());
+            });
         });
         server_.Post("/api/v1/sensor/config", [this](const httplib::Request& request, httplib::Response& response) {
             posted = request.body;
@@ -41,6 +45,8 @@ class FakeSensor {
     std::string host() const { return "127.0.0.1:" + std::to_string(port_); }
 
     int status = 200;
+    std::atomic<bool> endless{false};  ///< `metadata` again and again...
+    milliseconds pause{0};             ///< ... after this
     std::string metadata = R"({"sensor_info": {"status": "RUNNING", "prod_line": "OS-0-128"}})";
     std::string posted;
     std::string query;
@@ -94,6 +100,30 @@ TEST(SensorClient, AnAbsentSensorIsAnErrorWithinTheTimeout) {
     const auto begin = std::chrono::steady_clock::now();
     EXPECT_NE(error_of(SensorClient("127.0.0.1:1", milliseconds(300))).find("127.0.0.1:1"), std::string::npos);
     EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(3));
+}
+
+TEST(SensorClient, AnAnswerWithoutEndIsCutOff) {
+    FakeSensor sensor;
+    sensor.endless = true;
+    sensor.metadata = std::string(100'000, ' ');
+    EXPECT_NE(error_of(SensorClient(sensor.host())).find("too large"), std::string::npos);
+    sensor.metadata = " ";
+    sensor.pause = milliseconds(20);
+    const auto begin = std::chrono::steady_clock::now();
+    EXPECT_NE(error_of(SensorClient(sensor.host(), milliseconds(200))), "");
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(10));
+}
+
+TEST(SensorClient, WhatASensorSaysIsOneLineOfTheLog) {
+    FakeSensor sensor;
+    sensor.status = 500;
+    sensor.metadata = "broken\nWATCHDOG=1\x1b[31m" + std::string(1000, 'x');
+    const std::string error = error_of(SensorClient(sensor.host()));
+    EXPECT_EQ(error.find_first_of("\n\x1b"), std::string::npos) << error;
+    EXPECT_LT(error.size(), 400U);
+    sensor.status = 200;
+    sensor.metadata = R"({"sensor_info": {"status": "UP\nSTOPPING=1"}})";
+    EXPECT_EQ(error_of(SensorClient(sensor.host())).find('\n'), std::string::npos);
 }
 
 TEST(SensorClient, SendsOnlyTheSettingsThatAreGiven) {

@@ -19,5 +19,19 @@ TEST(RepeatedWarnings, AreHeldBackAndCounted) {
     EXPECT_NE(log.find("9 more like this"), std::string::npos) << log;
 }
 
+TEST(RepeatedWarnings, ThatAreEverOthersAreHeldBackToo) {
+    set_up_log(2);
+    RepeatedWarnings warnings(std::chrono::seconds(10));
+    const auto now = RepeatedWarnings::Clock::now();
+    testing::internal::CaptureStderr();
+    std::size_t written = 0;
+    for (int i = 0; i < 1000; ++i) {
+        const std::string answer = "the sensor answers " + std::to_string(i);
+        written += warnings.warn(answer, answer, now) ? 1 : 0;
+    }
+    testing::internal::GetCapturedStderr();
+    EXPECT_EQ(written, RepeatedWarnings::kMostKinds + 1);
+}
+
 }  // namespace
 }  // namespace dlod::daemon

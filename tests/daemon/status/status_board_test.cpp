@@ -80,6 +80,15 @@ TEST_F(StatusBoardTest, HealthSaysWhatIsWrongAndWhatToDo) {
     EXPECT_EQ(at(30.0, {{"packets_kernel_drops", 5}}, 20.0).health, status_t::WAITING);
 }
 
+TEST_F(StatusBoardTest, PacketsThatHaveOnlyJustComeMayBeWithoutAPose) {
+    EXPECT_EQ(at(60.0, {}, 0.0).health, status_t::WAITING) << "a sensor that boots slowly";
+    EXPECT_EQ(at(61.0, {}, 61.0).health, status_t::OK) << board_.one_line();
+    pose_at(62.0);
+    EXPECT_EQ(at(70.0, {}, 63.0).health, status_t::WAITING) << "unplugged";
+    EXPECT_EQ(at(71.0, {}, 71.0).health, status_t::OK) << board_.one_line();
+    EXPECT_EQ(at(74.0, {}, 74.0).health, status_t::FAULT) << "packets, but no pose for three seconds";
+}
+
 TEST_F(StatusBoardTest, AnAnswerGoesOutAtOnceAndStays) {
     pose_at(2.0);
     EXPECT_EQ(at(2.0, {{"frames", 10}}, 2.0).command_id, 0) << "none yet";

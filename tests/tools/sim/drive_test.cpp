@@ -122,6 +122,53 @@ TEST(Drive, TheSameSeedGivesTheSameBytesWhateverTheThreads) {
                             [](const Datagram& a, const Datagram& b) { return a.bytes == b.bytes; }));
 }
 
+// Each beam has errors of its own that stay the same, and leaves show another face each time.
+TEST(Drive, RoughMeasurementsAreOffByTheBeamAndScatteredByLeaves) {
+    DriveSettings settings;
+    settings.scene = "slope";
+    settings.sensor = "OS0-32";
+    settings.world.movers = false;
+    settings.world.duration_s = 0.3;
+    settings.world.robot = {.speed_mps = 0.0, .wobble = false};
+    const RecordedDrive smooth = record(settings);
+    settings.rough = true;
+    const RecordedDrive rough = record(settings);
+    const int rows = smooth.sensor.model.height;
+    double apart = 0.0;
+    for (int row = 0; row < rows; ++row) {
+        double bias[2] = {};
+        for (const int turn : {0, 1}) {
+            std::vector<double> difference_m;
+            const auto& a = smooth.scans[static_cast<std::size_t>(turn)].first.range_mm;
+            const auto& b = rough.scans[static_cast<std::size_t>(turn)].first.range_mm;
+            for (int c = 0; c < a.width(); ++c) {
+                if (a(row, c) != 0 && b(row, c) != 0)
+                    difference_m.push_back((static_cast<double>(b(row, c)) - static_cast<double>(a(row, c))) * 1e-3);
+            }
+            ASSERT_GT(difference_m.size(), 50U) << "row " << row;
+            const auto middle = difference_m.begin() + static_cast<std::ptrdiff_t>(difference_m.size() / 2);
+            std::nth_element(difference_m.begin(), middle, difference_m.end());
+            bias[turn] = *middle;
+        }
+        EXPECT_LT(std::abs(bias[0]), 0.1) << "row " << row;
+        EXPECT_NEAR(bias[0], bias[1], 0.02) << "row " << row;
+        apart += std::abs(bias[0]) / rows;
+    }
+    EXPECT_GT(apart, 0.003);
+    // Standing still, few ranges change by much from turn to turn but those of leaves and strays.
+    const auto changes = [](const RecordedDrive& drive) {
+        int count = 0;
+        const auto& a = drive.scans[0].first.range_mm;
+        const auto& b = drive.scans[1].first.range_mm;
+        for (std::size_t i = 0; i < a.size(); ++i) {
+            if (a[i] != 0 && b[i] != 0)
+                count += std::abs(static_cast<double>(a[i]) - static_cast<double>(b[i])) > 300.0 ? 1 : 0;
+        }
+        return count;
+    };
+    EXPECT_GT(changes(rough), 3 * changes(smooth) + 20);
+}
+
 TEST(Drive, NobodyIsThereWithoutMovers) {
     DriveSettings settings;
     settings.world.movers = false;

@@ -19,6 +19,7 @@ struct DriveSettings {
     std::string mode = "512x10";
     std::string profile = "RNG19_RFL8_SIG16_NIR16";
     bool noise = true;
+    bool rough = false;
     int threads = 2;
     FaultOptions faults;
 };
