@@ -147,7 +147,13 @@ void KeyframeDatabase::find_bounds(Keyframe& keyframe) {
 }
 
 void KeyframeDatabase::set_provisional(const KeyframeCloud& cloud) {
-    submap_.remove(provisional_);
+    const bool alone =
+        std::none_of(keyframes_.begin(), keyframes_.end(), [](const Keyframe& k) { return k.in_submap; });
+    if (alone) {
+        submap_.clear();
+    } else {
+        submap_.remove(provisional_);
+    }
     convert(cloud, provisional_);
     submap_.add(provisional_);
 }

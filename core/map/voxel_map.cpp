@@ -12,9 +12,24 @@ constexpr std::size_t kInitialTable = std::size_t{1} << 13;  // blocks
 constexpr std::size_t kInitialVoxels = std::size_t{1} << 15;
 constexpr std::size_t kInitialFacets = std::size_t{1} << 16;
 
-std::int32_t floor_divide(std::int32_t a, std::int32_t b) {
-    const std::int32_t q = a / b;
-    return q * b > a ? q - 1 : q;
+/// Quotient of a whole number, rounded down, and remainder.
+struct Quotient {
+    std::int32_t whole, rest;
+};
+
+/// Without a division. @param inverse 1 / b
+inline Quotient divide(std::int32_t a, std::int32_t b, double inverse) {
+    // Off by one at most: the remainder tells, in masks.
+    Quotient q;
+    q.whole = static_cast<std::int32_t>(static_cast<double>(a) * inverse);
+    q.rest = a - q.whole * b;
+    const std::int32_t under = q.rest >> 31;
+    q.whole += under;
+    q.rest += b & under;
+    const std::int32_t over = (b - 1 - q.rest) >> 31;
+    q.whole -= over;
+    q.rest -= b & over;
+    return q;
 }
 
 }  // namespace
@@ -51,7 +66,8 @@ void VoxelMap::clear() {
 }
 
 VoxelIndex VoxelMap::index_of(const FixedPoint& p) const {
-    return {floor_divide(p.x, side_), floor_divide(p.y, side_), floor_divide(p.z, side_)};
+    const double inverse = 1.0 / side_;
+    return {divide(p.x, side_, inverse).whole, divide(p.y, side_, inverse).whole, divide(p.z, side_, inverse).whole};
 }
 
 std::uint32_t VoxelMap::make_block(std::uint64_t key) {
@@ -114,8 +130,12 @@ std::size_t VoxelMap::facet_of(const FixedPoint& p) {
 
 void VoxelMap::accumulate(std::span<const FixedPoint> points, int sign) {
     constexpr std::int64_t kOne = std::int64_t{kNormalUnits} * kNormalUnits;
+    const double inverse_side = 1.0 / side_;
     for (const FixedPoint& p : points) {
-        const VoxelIndex index = index_of(p);
+        const Quotient x = divide(p.x, side_, inverse_side);
+        const Quotient y = divide(p.y, side_, inverse_side);
+        const Quotient z = divide(p.z, side_, inverse_side);
+        const VoxelIndex index{x.whole, y.whole, z.whole};
         const std::uint64_t key = key_of(index);
         std::uint32_t block = block_of(key);
         if (block == kNone) block = make_block(key);
@@ -133,9 +153,7 @@ void VoxelMap::accumulate(std::span<const FixedPoint> points, int sign) {
         }
         const std::uint32_t facet = voxel.facet[side];
         Moments& m = facets_[facet];
-        const std::int64_t d[3] = {p.x - (std::int64_t{index.x} * side_ + side_ / 2),
-                                   p.y - (std::int64_t{index.y} * side_ + side_ / 2),
-                                   p.z - (std::int64_t{index.z} * side_ + side_ / 2)};
+        const std::int64_t d[3] = {x.rest - side_ / 2, y.rest - side_ / 2, z.rest - side_ / 2};
         const std::int64_t n[3] = {p.nx, p.ny, p.nz};
         const bool disc = side != kNoNormal;
         const std::int32_t weight = disc ? sign * kFlatWeight : sign;
