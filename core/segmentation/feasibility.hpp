@@ -34,6 +34,9 @@ struct FeasibilityConfig {
     }
 };
 
+/// True where what is seen of a segment is more than the rules allow: the rest of it will not change that.
+bool is_too_large(float height_m, float length_m, float max_range_m, const FeasibilityConfig& config);
+
 /// True where the segment passes every rule. Uses count, rows, bounds and max_range_m.
 bool is_feasible(const Segment& segment, const FeasibilityConfig& config);
 

@@ -43,6 +43,19 @@ DLOD_MULTIVERSION_512 void cylindrical_row(int width, const float* __restrict x,
     }
 }
 
+/// The same for every kColumnStep-th column. Exact where there is a return, whatever its range.
+DLOD_MULTIVERSION_512 void sample_cylindrical_row(int samples, const float* __restrict x, const float* __restrict y,
+                                                  const float* __restrict z, float ux, float uy, float uz,
+                                                  float* __restrict distance, float* __restrict height) {
+    for (int i = 0; i < samples; ++i) {
+        const int c = i * kColumnStep;
+        const float h = ux * x[c] + (uy * y[c] + uz * z[c]);
+        const float horizontal = x[c] * x[c] + (y[c] * y[c] + z[c] * z[c]) - h * h;
+        distance[i] = std::sqrt(horizontal > 0.0F ? horizontal : 0.0F);
+        height[i] = h;
+    }
+}
+
 struct LineFilterParameters {
     float max_slope;
     float height_tolerance;
@@ -93,7 +106,12 @@ DLOD_MULTIVERSION_512 void follow_ground_row(int width, const float* __restrict 
 }  // namespace
 
 GroundRemoval::GroundRemoval(const SensorModel& sensor, const GroundRemovalConfig& config)
-    : sensor_(sensor), config_(config), distance_(kRows, sensor.width), height_(kRows, sensor.width) {
+    : sensor_(sensor),
+      config_(config),
+      distance_(kRows, sensor.width),
+      height_(kRows, sensor.width),
+      sampled_distance_(kRows, (sensor.width + kColumnStep - 1) / kColumnStep),
+      sampled_height_(kRows, sampled_distance_.width()) {
     const auto width = static_cast<std::size_t>(sensor.width);
     for (auto* v : {&line_distance_, &line_height_, &line_slope_, &line_started_}) v->assign(width, 0.0F);
     for (std::size_t r = 0; r < static_cast<std::size_t>(sensor.height); ++r) {
@@ -169,23 +187,29 @@ void GroundRemoval::update_sensor_height(const StructuredCloud& cloud) {
     const auto min_range = static_cast<float>(config_.min_range_m);
     const auto highest = static_cast<float>(-config_.min_sensor_height_m);
     constexpr float kFarthest_m = 15.0F;
+    const int samples = sampled_distance_.width();
+    const auto sample_row = [&](int r) {
+        sample_cylindrical_row(samples, cloud.x.row(r), cloud.y.row(r), cloud.z.row(r), up_.x(), up_.y(), up_.z(),
+                               sampled_distance_.row(r % kRows), sampled_height_.row(r % kRows));
+    };
+    const int bottom = sensor_.height - 1;
     const int top = std::max(kRowsAbove, top_row());
-    for (int r = sensor_.height - 1; r >= top; --r) {
+    for (int r = bottom; r > bottom - kRowsAbove && r >= 0; --r) sample_row(r);
+    for (int r = bottom; r >= top; --r) {
+        const int above = r - kRowsAbove;
+        sample_row(above);
         const float wall_rise = wall_rise_[static_cast<std::size_t>(r)];
-        for (int c = 0; c < sensor_.width; c += kColumnStep) {
-            const Eigen::Vector3f here(cloud.x(r, c), cloud.y(r, c), cloud.z(r, c));
-            const Eigen::Vector3f above(cloud.x(r - kRowsAbove, c), cloud.y(r - kRowsAbove, c),
-                                        cloud.z(r - kRowsAbove, c));
-            const float height = up_.dot(here);
-            const float range = cloud.range_m(r, c);
-            if (height > highest || range < min_range || range > kFarthest_m ||
-                cloud.range_m(r - kRowsAbove, c) == 0.0F)
-                continue;
-            const float height_above = up_.dot(above);
-            const float distance = std::sqrt(std::max(0.0F, here.squaredNorm() - height * height));
-            const float run = std::sqrt(std::max(0.0F, above.squaredNorm() - height_above * height_above)) - distance;
-            if (run <= 0.0F || std::abs(height_above - height) > max_slope * run + kNoiseShare * wall_rise * distance)
-                continue;
+        const float* range = cloud.range_m.row(r);
+        const float* range_above = cloud.range_m.row(above);
+        for (int i = 0; i < samples; ++i) {
+            const float height = sampled_height_(r % kRows, i);
+            const float distance = sampled_distance_(r % kRows, i);
+            const float run = sampled_distance_(above % kRows, i) - distance;
+            if (height > highest || run <= 0.0F) continue;
+            const int c = i * kColumnStep;
+            if (range[c] < min_range || range[c] > kFarthest_m || range_above[c] == 0.0F) continue;
+            const float rise = sampled_height_(above % kRows, i) - height;
+            if (std::abs(rise) > max_slope * run + kNoiseShare * wall_rise * distance) continue;
             const auto bin = static_cast<std::size_t>((-static_cast<double>(height) - config_.min_sensor_height_m) /
                                                       kHistogramBin_m);
             if (bin + 1 < histogram_.size()) ++histogram_[bin];

@@ -65,8 +65,8 @@ class GroundRemoval {
     SensorModel sensor_;
     GroundRemovalConfig config_;
     Eigen::Vector3f gravity_up_ = Eigen::Vector3f::UnitZ();  ///< from the accelerometer, over seconds
-    bool started_ = false;  ///< gravity_up_ is known
-    bool settled_ = false;  ///< up_ is that of ground
+    bool started_ = false;                                   ///< gravity_up_ is known
+    bool settled_ = false;                                   ///< up_ is that of ground
     Eigen::Vector3f up_ = Eigen::Vector3f::UnitZ();
     double sensor_height_m_ = 0.0;
     /// Of the row at hand and those that its slopes are taken to, [kRows][W]: horizontal distance from the sensor (0:
@@ -75,6 +75,7 @@ class GroundRemoval {
     Image<float> distance_, height_;
     AlignedVector<float> line_distance_, line_height_, line_slope_, line_started_;  ///< [W] the columns' line filters
     AlignedVector<float> wall_rise_;  ///< [H] difference of the beams' tangents to the row that slopes are taken to
+    Image<float> sampled_distance_, sampled_height_;  ///< likewise of every few columns, [kRows]
     AlignedVector<int> histogram_;
 };
 

@@ -167,10 +167,13 @@ void RangeImageSegmentation::collect(Preparation& prepared, const StructuredClou
             PixelIndex* pixels = &prepared.pixels[segment.next_pixel];
             std::iota(pixels, pixels + count, static_cast<PixelIndex>(begin + first_[i]));
             segment.next_pixel += static_cast<std::uint32_t>(count);
+            if (segment.too_large) continue;
             // Both ends and every few pixels between: the cost counts, the millimetres do not.
             const std::size_t last = last_[i];
             for (std::size_t c = first_[i]; c < last + kBoundsStep; c += kBoundsStep)
                 include(segment.bounds, begin + std::min(c, last));
+            segment.too_large = is_too_large(segment.bounds.height(), segment.bounds.length(), segment.bounds.high[3],
+                                             config_.feasibility);
         }
     }
     for (std::size_t s = 0; s < growing_.size(); ++s) {

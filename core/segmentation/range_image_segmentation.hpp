@@ -52,6 +52,7 @@ class RangeImageSegmentation {
         Eigen::Array4f high_diagonal = Eigen::Array4f::Constant(-1e9F);  ///< x + y, x - y and their negatives
 
         float length() const;
+        float height() const { return high[2] - low[2]; }
     };
 
     /// A segment while its runs are collected.
@@ -60,6 +61,7 @@ class RangeImageSegmentation {
         std::uint32_t next_pixel = 0;
         int last_row = -1;
         std::uint16_t rows = 0;
+        bool too_large = false;  ///< no object, whatever follows: its bounds are not followed any more
     };
 
     /// Finds the runs and their union-find.
