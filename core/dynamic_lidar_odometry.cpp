@@ -63,6 +63,7 @@ void DynamicLidarOdometry::estimate_pose(Frame& frame, const OdometryFeedback& f
 
 void DynamicLidarOdometry::detect(Frame& frame) {
     if (frame.restart) detector_.emplace(sensor_, config_.detection);
+    DynamicPointsRemoval::take_back(frame);
     frame.detection.clear();
     if (config_.handle_dynamic_objects) detector_->process(frame);
 }

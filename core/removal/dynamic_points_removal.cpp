@@ -47,9 +47,13 @@ void DynamicPointsRemoval::process(Frame& frame, OdometryFeedback& feedback) {
     if (frame.odometry.keyframe) fill_keyframe(frame, feedback);
 }
 
+// A few pixels instead of the whole image.
+void DynamicPointsRemoval::take_back(Frame& frame) {
+    for (const PixelIndex pixel : frame.detection.pixels) frame.detection.instance[pixel] = 0;
+}
+
 void DynamicPointsRemoval::label_pixels(Frame& frame) const {
     DetectionResult& result = frame.detection;
-    result.instance.fill(0);
     result.dynamic_points = 0;
     const bool valid = frame.odometry.follows_map();
     if (valid) {

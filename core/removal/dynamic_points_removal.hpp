@@ -18,14 +18,17 @@ struct RemovalConfig {
     }
 };
 
-/// Fills frame.detection.label, .instance and .dynamic_points from this frame's detections alone (a track that is only
-/// predicted marks no pixel), and the feedback to the odometry: boxes of moving objects, boxes to clear, and the
-/// keyframe without the points of objects that are not static. Grows frame.detection.cleared by the margin. A frame
-/// whose odometry is not valid knows no ground and no moving object.
+/// Fills frame.detection.label, .instance (0 before: take_back()) and .dynamic_points from this frame's detections
+/// alone (a track that is only predicted marks no pixel), and the feedback to the odometry: boxes of moving objects,
+/// boxes to clear, and the keyframe without the points of objects that are not static. Grows frame.detection.cleared by
+/// the margin. A frame whose odometry is not valid knows no ground and no moving object.
 class DynamicPointsRemoval {
   public:
     DynamicPointsRemoval(const SensorModel& sensor, const RemovalConfig& config) : sensor_(sensor), config_(config) {}
     void process(Frame& frame, OdometryFeedback& feedback);
+    /// Unmarks the objects of the frame that was in this workspace before: frame.detection.instance is 0 again. To be
+    /// called before its detections are cleared.
+    static void take_back(Frame& frame);
 
   private:
     void label_pixels(Frame& frame) const;

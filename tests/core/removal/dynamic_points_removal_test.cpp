@@ -81,6 +81,7 @@ TEST_F(DynamicPointsRemovalTest, EveryPixelHasItsLabelAndInstance) {
 // The reference masked the pixels of tracks that had not been seen for up to nine scans.
 TEST_F(DynamicPointsRemovalTest, APredictedTrackMarksNoPixel) {
     removal.process(scene.frame, feedback);
+    DynamicPointsRemoval::take_back(scene.frame);
     scene.frame.detection.detections.clear();
     removal.process(scene.frame, feedback);
     for (std::size_t p = 0; p < scene.frame.detection.label.size(); ++p) {
