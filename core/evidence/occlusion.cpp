@@ -15,19 +15,32 @@ void mark_occlusion(std::span<const PixelIndex> pixels, const Image<float>& rang
     const int reference = static_cast<int>(pixels.front()) % width;
     std::span<int> left = row_ends.first(static_cast<std::size_t>(height));
     std::span<int> right = row_ends.subspan(static_cast<std::size_t>(height), static_cast<std::size_t>(height));
-    std::fill(left.begin(), left.end(), width);
-    std::fill(right.begin(), right.end(), -width);
-    for (const PixelIndex p : pixels) {
-        const auto row = static_cast<std::size_t>(static_cast<int>(p) / width);
-        int column = static_cast<int>(p) % width - reference;
+    const auto [first, last] = std::minmax_element(pixels.begin(), pixels.end());
+    const int top = static_cast<int>(*first) / width;
+    const int bottom = static_cast<int>(*last) / width;
+    std::fill(left.begin() + top, left.begin() + bottom + 1, width);
+    std::fill(right.begin() + top, right.begin() + bottom + 1, -width);
+    std::size_t at = 0;  // the row at hand
+    int row_begin = -width;
+    for (const PixelIndex pixel : pixels) {
+        const auto p = static_cast<int>(pixel);
+        // Pixels of a row mostly follow each other.
+        if (p < row_begin || p >= row_begin + width) {
+            at = static_cast<std::size_t>(p / width);
+            row_begin = p / width * width;
+        }
+        int column = p - row_begin - reference;
         if (column >= width / 2) column -= width;
         if (column < -width / 2) column += width;
-        left[row] = std::min(left[row], column);
-        right[row] = std::max(right[row], column);
+        left[at] = std::min(left[at], column);
+        right[at] = std::max(right[at], column);
     }
     constexpr int kReach = 3;  // columns beyond the end in which the neighbour's return is looked for
     const auto step = static_cast<float>(min_step_m);
-    const auto wrapped = [&](int column) { return ((column + reference) % width + width) % width; };
+    const auto wrapped = [&](int column) {
+        const int c = column + reference;
+        return c < 0 ? c + width : c >= width ? c - width : c;
+    };
     const auto nearer_beyond = [&](int row, int end, int direction) {
         const float own = range_m(row, wrapped(end));
         for (int i = 1; i <= kReach; ++i) {
@@ -39,12 +52,13 @@ void mark_occlusion(std::span<const PixelIndex> pixels, const Image<float>& rang
     int rows = 0;
     int hidden_left = 0;
     int hidden_right = 0;
-    for (int r = 0; r < height; ++r) {
-        const auto row = static_cast<std::size_t>(r);
-        if (right[row] < left[row]) continue;
+    for (int r = top; r <= bottom; ++r) {
+        const int leftmost = left[static_cast<std::size_t>(r)];
+        const int rightmost = right[static_cast<std::size_t>(r)];
+        if (rightmost < leftmost) continue;
         ++rows;
-        hidden_left += nearer_beyond(r, left[row], -1) ? 1 : 0;
-        hidden_right += nearer_beyond(r, right[row], 1) ? 1 : 0;
+        hidden_left += nearer_beyond(r, leftmost, -1) ? 1 : 0;
+        hidden_right += nearer_beyond(r, rightmost, 1) ? 1 : 0;
     }
     detection.occluded_left = 2 * hidden_left >= rows;
     detection.occluded_right = 2 * hidden_right >= rows;

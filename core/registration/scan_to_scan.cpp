@@ -24,7 +24,9 @@ float fast_atan2(float y, float x) {
 
 }  // namespace
 
-ScanToScan::ScanToScan(const ScanToScanConfig& config) : config_(config), grid_(kColumns * kRows) {}
+ScanToScan::ScanToScan(const ScanToScanConfig& config) : config_(config), grid_(kColumns * kRows) {
+    set_.reserve(grid_.size());
+}
 
 int ScanToScan::cell_of(const float p[3]) {
     constexpr float kPi = std::numbers::pi_v<float>;
@@ -37,14 +39,17 @@ int ScanToScan::cell_of(const float p[3]) {
 
 void ScanToScan::set_target(const PointSelection& points, std::span<const std::uint8_t> excluded,
                             const PlacedPoints& placed, const Eigen::Isometry3f& T_sensor_local) {
-    for (Surfel& surfel : grid_) surfel.set = false;
+    for (const int cell : set_) grid_[static_cast<std::size_t>(cell)].set = false;
+    set_.clear();
     const std::size_t count = excluded.empty() ? points.size() : excluded.size();
     for (std::size_t i = 0; i < count; ++i) {
         if (points.planarity[i] <= 0.0F || (!excluded.empty() && excluded[i])) continue;
         const Eigen::Vector3f p = T_sensor_local * Eigen::Vector3f(placed.x[i], placed.y[i], placed.z[i]);
         const Eigen::Vector3f n = T_sensor_local.linear() * Eigen::Vector3f(placed.nx[i], placed.ny[i], placed.nz[i]);
         if (n.isZero()) continue;
-        Surfel& surfel = grid_[static_cast<std::size_t>(cell_of(p.data()))];
+        const int cell = cell_of(p.data());
+        Surfel& surfel = grid_[static_cast<std::size_t>(cell)];
+        if (!surfel.set) set_.push_back(cell);
         std::copy_n(p.data(), 3, surfel.position);
         std::copy_n(n.data(), 3, surfel.normal);
         surfel.set = true;

@@ -62,6 +62,7 @@ class ScanToScan {
 
     ScanToScanConfig config_;
     std::vector<Surfel> grid_;
+    std::vector<int> set_;  ///< cells of it
     bool filled_ = false;
 };
 

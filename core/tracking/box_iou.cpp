@@ -89,12 +89,26 @@ double box_iou(const OrientedBox& a, const OrientedBox& b) {
     return either > 0.0 ? both / either : 0.0;
 }
 
+Footprint::Footprint(const OrientedBox& box)
+    : center_m_(box.center_m),
+      cosine_(std::cos(box.yaw_rad)),
+      sine_(std::sin(box.yaw_rad)),
+      half_length_m_(0.5 * box.size_m.x()),
+      half_width_m_(0.5 * box.size_m.y()) {}
+
+Eigen::Vector2d Footprint::beyond(const Eigen::Vector3d& point_m) const {
+    const Eigen::Vector3d d = point_m - center_m_;
+    return {std::max(0.0, std::abs(cosine_ * d.x() + sine_ * d.y()) - half_length_m_),
+            std::max(0.0, std::abs(-sine_ * d.x() + cosine_ * d.y()) - half_width_m_)};
+}
+
+double Footprint::distance_m(const Eigen::Vector3d& point_m) const {
+    const Eigen::Vector2d out = beyond(point_m);
+    return out.x() == 0.0 || out.y() == 0.0 ? out.maxCoeff() : std::hypot(out.x(), out.y());
+}
+
 double footprint_distance_m(const OrientedBox& box, const Eigen::Vector3d& point_m) {
-    const Eigen::Vector3d d = point_m - box.center_m;
-    const double c = std::cos(box.yaw_rad), s = std::sin(box.yaw_rad);
-    const double u = std::max(0.0, std::abs(c * d.x() + s * d.y()) - 0.5 * box.size_m.x());
-    const double v = std::max(0.0, std::abs(-s * d.x() + c * d.y()) - 0.5 * box.size_m.y());
-    return std::hypot(u, v);
+    return Footprint(box).distance_m(point_m);
 }
 
 Eigen::Vector2d joint_size(const OrientedBox& a, const OrientedBox& b, double yaw_rad) {

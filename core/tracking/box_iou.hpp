@@ -14,6 +14,22 @@ double footprint_iou(const OrientedBox& a, const OrientedBox& b);
 /// Intersection over union of the volumes, 0 to 1: footprints clipped exactly, times the overlap of the heights.
 double box_iou(const OrientedBox& a, const OrientedBox& b);
 
+/// The footprint of a box, made ready for many points.
+class Footprint {
+  public:
+    explicit Footprint(const OrientedBox& box);
+    /// Distance [m] in the ground plane to a point, 0 inside.
+    double distance_m(const Eigen::Vector3d& point_m) const;
+    bool contains(const Eigen::Vector3d& point_m) const { return beyond(point_m).isZero(0.0); }
+
+  private:
+    /// How far the point lies beyond the sides, along and across.
+    Eigen::Vector2d beyond(const Eigen::Vector3d& point_m) const;
+
+    Eigen::Vector3d center_m_;
+    double cosine_, sine_, half_length_m_, half_width_m_;
+};
+
 /// Distance [m] in the ground plane from a point to a box, 0 inside.
 double footprint_distance_m(const OrientedBox& box, const Eigen::Vector3d& point_m);
 

@@ -4,8 +4,6 @@
 #include <array>
 #include <cmath>
 
-#include "core/tracking/box_iou.hpp"
-
 namespace dlod {
 
 namespace {
@@ -111,13 +109,15 @@ bool MergedDetections::share_out(const Detection& whole, const DetectionShapes& 
     const PointSpan points = shapes.points(whole);
     owner_.resize(whole.count);
     counts_.assign(covered_.size(), 0);
+    footprints_.clear();
+    for (const std::size_t t : covered_) footprints_.emplace_back(tracks[t].visible);
     for (std::size_t i = 0; i < whole.count; ++i) {
         const Eigen::Vector3d p = shapes.origin() + Eigen::Vector3d(points.x[i], points.y[i], points.z[i]);
         double best = 0.0;
         for (std::size_t k = 0; k < covered_.size(); ++k) {
             const OrientedBox& box = tracks[covered_[k]].visible;
             // Inside of several boxes, the nearer middle decides.
-            const double distance = footprint_distance_m(box, p) + 0.2 * (box.center_m - p).head<2>().norm();
+            const double distance = footprints_[k].distance_m(p) + 0.2 * (box.center_m - p).head<2>().norm();
             if (k == 0 || distance < best) {
                 best = distance;
                 owner_[i] = k;
@@ -198,9 +198,10 @@ bool MergedDetections::cut_out(const Detection& whole, const DetectionShapes& sh
     const PointSpan points = shapes.points(whole);
     owner_.resize(whole.count);
     counts_.assign(2, 0);
+    const Footprint footprint(box);
     for (std::size_t i = 0; i < whole.count; ++i) {
         const Eigen::Vector3d p = shapes.origin() + Eigen::Vector3d(points.x[i], points.y[i], points.z[i]);
-        owner_[i] = footprint_distance_m(box, p) > 0.0 ? 1 : 0;
+        owner_[i] = footprint.contains(p) ? 0 : 1;
         ++counts_[owner_[i]];
     }
     return static_cast<double>(counts_[0]) >= std::max(kMinPart, kMinShare * track.points) &&

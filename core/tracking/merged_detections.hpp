@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/tracking/association.hpp"
+#include "core/tracking/box_iou.hpp"
 #include "core/tracking/detection_shapes.hpp"
 
 namespace dlod {
@@ -61,6 +62,7 @@ class MergedDetections {
     std::vector<Middle> middles_;
     bool bodies_ = false;  ///< the tracks covered_ are those of people and the like, one as tall as the other
     std::vector<std::size_t> covered_;
+    std::vector<Footprint> footprints_;  ///< of the visible boxes of the tracks covered_
     std::vector<int> known_;
     std::vector<std::size_t> cut_;  ///< ascending
     std::vector<std::size_t> apart_;
