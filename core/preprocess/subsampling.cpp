@@ -11,6 +11,14 @@ namespace {
 // Weight of a raw point against a smoothed one of a perfect plane.
 constexpr float kRawPlanarity = 0.1F;
 
+// Of images with more columns so many more are skipped: what counts is the angle between candidates.
+constexpr int kColumns = 1024;
+
+SubsamplingConfig scaled(SubsamplingConfig config, int width) {
+    config.column_step = std::clamp(config.column_step * std::max(1, width / kColumns), 1, width);
+    return config;
+}
+
 /// Face of a cube that the direction points through, in quarters.
 std::uint8_t direction_bin(const Eigen::Vector3f& n) {
     Eigen::Index axis;
@@ -38,7 +46,7 @@ int fair_share(const std::array<int, N>& counts, int budget) {
 }  // namespace
 
 Subsampling::Subsampling(const SensorModel& sensor, const SubsamplingConfig& config)
-    : sensor_(sensor), config_(config), windows_(sensor, std::clamp(config.column_step, 1, sensor.width)) {
+    : sensor_(sensor), config_(scaled(config, sensor.width)), windows_(sensor, config_.column_step) {
     const int rows = std::clamp(config.rows, 1, sensor.height);
     for (int i = 0; i < rows; ++i) candidate_rows_.push_back((2 * i + 1) * sensor.height / (2 * rows));
     const auto most = static_cast<std::size_t>(rows) * static_cast<std::size_t>(windows_.windows());

@@ -24,7 +24,8 @@ struct SubsamplingConfig {
     void visit(V& v) {
         v.parameter("rows", rows, Range{4, 512}, "rows",
                     "rows of the image that are candidates; more is slower, more accurate");
-        v.parameter("column_step", column_step, Range{1, 64}, "columns", "every n-th column is a candidate");
+        v.parameter("column_step", column_step, Range{1, 64}, "columns",
+                    "every n-th of 1024 columns is a candidate; finer images have no more of them");
         v.parameter("rough_step", rough_step, Range{1, 16}, "candidates",
                     "every n-th candidate of what is not flat; lower sees smaller moving objects");
         v.parameter("points", points, Range{200, 50000}, "points",
