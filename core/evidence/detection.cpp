@@ -15,19 +15,24 @@ struct Detector::State {
           residuals(sensor),
           evidence(sensor, c.free_space),
           parts(sensor, c.parts),
+          plates(sensor, c.plates, evidence.narrow_bits()),
           completion(sensor, c.completion),
           row_ends(2 * static_cast<std::size_t>(sensor.height)) {
         counts.reserve(4096);
+        whole.reserve(4096);
         completed.reserve(sensor.pixels());
     }
 
     /// Tested pixels of a segment by what they say.
     struct Counts {
         int free = 0, occupied = 0, unknown = 0;
+        bool plate = false;  ///< a part of it has turned
     };
 
     void test(const Frame& frame);
+    void find_plates(const Frame& frame);
     void count(const Frame& frame);
+    bool is_compact(const Segment& segment) const;
     bool is_divided(const Segment& segment, const Counts& c) const;
     void detect(Frame& frame);
     void add(Frame& frame, std::size_t segment, std::span<const PixelIndex> pixels);
@@ -37,8 +42,10 @@ struct Detector::State {
     ResidualImage residuals;
     EvidenceImage evidence;
     MovingParts parts;
+    TurnedPlates plates;
     Completion completion;
-    std::vector<Counts> counts;  ///< by segment
+    std::vector<Counts> counts;       ///< by segment
+    std::vector<std::uint8_t> whole;  ///< likewise: 1 of what is no larger than a person
     std::vector<int> row_ends;
     std::vector<PixelIndex> completed;  ///< pixels of the completed detections, swapped with the frame's
 };
@@ -51,15 +58,19 @@ void Detector::State::count(const Frame& frame) {
     }
 }
 
+bool Detector::State::is_compact(const Segment& segment) const {
+    const Eigen::Vector3f size = segment.max_m - segment.min_m;
+    return segment.feasible && static_cast<double>(std::max(size.x(), size.y())) <= config.compact_m;
+}
+
 /// Free and occupied places in one segment, or free ones in something that is no object: only parts of it move.
 bool Detector::State::is_divided(const Segment& segment, const Counts& c) const {
     constexpr int kFewest = 3;
+    if (c.plate) return true;
     if (c.free < kFewest) return false;
-    const Eigen::Vector3f size = segment.max_m - segment.min_m;
     // A slow or turning object is partly where it was before: one no larger than a person stays whole unless most of it
     // was there.
-    const bool compact = segment.feasible && static_cast<double>(std::max(size.x(), size.y())) <= config.compact_m;
-    if (compact && 2 * c.occupied <= 5 * c.free) return false;
+    if (is_compact(segment) && 2 * c.occupied <= 5 * c.free) return false;
     return !segment.feasible || (c.occupied >= kFewest && c.occupied > config.mixed_share * (c.free + c.occupied));
 }
 
@@ -68,6 +79,8 @@ void Detector::State::test(const Frame& frame) {
     parts.begin();
     const Preparation& prepared = frame.prepared;
     counts.assign(prepared.segments.size(), {});
+    whole.assign(prepared.segments.size(), 0);
+    for (std::size_t s = 0; s < prepared.segments.size(); ++s) whole[s] = is_compact(prepared.segments[s]) ? 1 : 0;
     for (const Segment& segment : prepared.segments) {
         const auto samples = static_cast<std::uint32_t>(config.samples);
         // Small leftovers may be far objects or parts of near ones: tested like objects.
@@ -81,11 +94,24 @@ void Detector::State::test(const Frame& frame) {
     }
     evidence.run(frame);
     count(frame);
+    plates.begin();
+    if (config.use_plates) plates.request(frame, whole, evidence);
     for (std::size_t s = 0; s < prepared.segments.size(); ++s) {
         if (is_divided(prepared.segments[s], counts[s])) parts.request_around(frame, prepared.segments[s], evidence);
     }
     evidence.run(frame);
     count(frame);
+    if (config.use_plates) find_plates(frame);
+}
+
+/// What belongs to a plate that has turned moves, whatever its single points say.
+void Detector::State::find_plates(const Frame& frame) {
+    plates.find(frame, evidence);
+    for (std::size_t k = 0; k < plates.size(); ++k) {
+        parts.take(plates[k]);
+        counts[frame.prepared.segment[plates[k].front()] - 1].plate = true;
+        for (const PixelIndex pixel : plates[k]) evidence.set(pixel, Evidence::kFree);
+    }
 }
 
 void Detector::State::add(Frame& frame, std::size_t segment, std::span<const PixelIndex> pixels) {
@@ -134,6 +160,7 @@ void Detector::State::complete(Frame& frame) {
 
 void Detector::State::detect(Frame& frame) {
     const Preparation& prepared = frame.prepared;
+    for (std::size_t k = 0; k < plates.size(); ++k) add(frame, prepared.segment[plates[k].front()] - 1, plates[k]);
     for (std::size_t s = 0; s < prepared.segments.size(); ++s) {
         const Segment& segment = prepared.segments[s];
         if (config.use_free_space && is_divided(segment, counts[s])) {

@@ -6,6 +6,7 @@
 #include "core/evidence/completion.hpp"
 #include "core/evidence/free_space.hpp"
 #include "core/evidence/moving_parts.hpp"
+#include "core/evidence/turned_plates.hpp"
 #include "core/residuals/residual_image.hpp"
 #include "core/types/frame.hpp"
 #include "core/types/parameter.hpp"
@@ -15,6 +16,7 @@ namespace dlod {
 struct DetectionConfig {
     bool use_residual = true;
     bool use_free_space = true;
+    bool use_plates = true;
     double max_range_m = 50.0;
     double occlusion_step_m = 0.3;
     int samples = 80;
@@ -23,12 +25,14 @@ struct DetectionConfig {
     double compact_m = 1.2;
     FreeSpaceConfig free_space;
     MovingPartsConfig parts;
+    TurnedPlatesConfig plates;
     CompletionConfig completion;
 
     template <class V>
     void visit(V& v) {
         v.flag("use_residual", use_residual, "cue: average registration residual of a segment (the paper's)");
         v.flag("use_free_space", use_free_space, "cue: a return where earlier frames saw free space");
+        v.flag("use_plates", use_plates, "and a plane that has turned, as doors do");
         v.parameter("max_range_m", max_range_m, Range{1.0, 200.0}, "m", "objects farther away are not looked for");
         v.parameter("occlusion_step_m", occlusion_step_m, Range{0.05, 5.0}, "m",
                     "a neighbour nearer by more than this hides the detection's side");
@@ -43,6 +47,7 @@ struct DetectionConfig {
                     "segments no wider than this are divided only where most of the evidence says occupied");
         v.group("free_space", free_space, "comparison with earlier frames");
         v.group("parts", parts, "moving parts of segments");
+        v.group("plates", plates, "doors, gates and other plates that turn");
         v.group("completion", completion, "pixels at the edges and feet of objects");
     }
 };

@@ -29,6 +29,11 @@ class EvidenceImage {
     void set(PixelIndex pixel, Evidence evidence) { image_[pixel] = static_cast<std::uint8_t>(evidence); }
     /// Pixels tested by the last run().
     std::span<const PixelIndex> tested() const { return points_.pixel; }
+    const CandidatePoints& points() const { return points_; }
+    /// Earlier frames that were compared with, newest first, and this frame as one.
+    std::span<const Reference* const> references() const { return selected_; }
+    const Reference& now() const { return *now_; }
+    int narrow_bits() const { return references_.narrow_bits(); }
 
   private:
     void sort_into_blocks(const OdometryResult& odometry);

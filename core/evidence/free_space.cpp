@@ -89,6 +89,28 @@ DLOD_MULTIVERSION void find_hidden(const CompareParameters& parameters, int n, c
     }
 }
 
+/// How far the points lie beyond what was seen in their directions, and outside of all of it.
+DLOD_MULTIVERSION_512 void measure_shift(int narrow_bits, float margin, float margin_per_m, int n,
+                                         const std::int32_t* __restrict pixel, const float* __restrict range,
+                                         const std::uint32_t* __restrict cells, float* __restrict shift,
+                                         float* __restrict outside) {
+    for (int i = 0; i < n; ++i) {
+        const std::int32_t inside = pixel[i] > 0 ? pixel[i] : 0;
+        const std::uint32_t seen = cells[inside >> narrow_bits];
+        const float r = range[i];
+        const float nearest = static_cast<float>(static_cast<std::int32_t>(seen & 0xFFFFU)) * kReferenceUnit_m;
+        const float farthest = static_cast<float>(static_cast<std::int32_t>(seen >> 16U)) * kReferenceUnit_m;
+        const bool known = (pixel[i] >= 0) & (seen != 0U);
+        const float limit = margin + margin_per_m * r;
+        const float beyond = r - farthest - limit;
+        const float before = nearest - r - limit;
+        const float farther = beyond > 0.0F ? beyond : 0.0F;
+        const float nearer = before > 0.0F ? before : 0.0F;
+        shift[i] = known ? r - 0.5F * (nearest + farthest) : shift[i];
+        outside[i] = known ? farther - nearer : outside[i];
+    }
+}
+
 /// Lists the marked ones of n points. @return how many there are
 std::size_t list_marked(std::size_t n, const std::uint8_t* __restrict marks, std::int32_t* __restrict list) {
     std::size_t count = 0;
@@ -200,6 +222,12 @@ void FreeSpace::compare_block(const Comparison& comparison, const Eigen::Isometr
     const CompareResults results{points.free.data() + begin, points.occupied.data() + begin, gap_.data(),
                                  cover_.data()};
     compare(parameters, n, pixel_.data(), range_.data(), comparison.reference.cells.data(), results);
+    if (comparison.order < CandidatePoints::kShifts) {
+        measure_shift(narrow_bits_, static_cast<float>(config_.shift_margin_m),
+                      static_cast<float>(config_.shift_margin_per_m), n, pixel_.data(), range_.data(),
+                      comparison.reference.cells.data(), points.shift[comparison.order].data() + begin,
+                      points.outside.data() + begin);
+    }
     if (!comparison.recent) return;
     find_hidden(parameters, n, range_.data(), gap_.data(), cover_.data(), points.fastest.data() + begin,
                 points.came.data() + begin, hidden_.data());
@@ -243,6 +271,9 @@ void FreeSpace::test(const Frame& frame, std::span<const Reference* const> refer
     for (auto* v : {&points.free, &points.occupied, &points.gone, &points.came}) v->assign(points.size(), 0.0F);
     points.slowest.assign(points.size(), static_cast<float>(config_.min_receding_mps));
     points.fastest.assign(points.size(), kFastest_mps);
+    for (auto& shift : points.shift) shift.assign(points.size(), CandidatePoints::kNoShift);
+    points.outside.assign(points.size(), 0.0F);
+    std::size_t order = 0;
     for (const Reference* const reference : references) {
         const double age_s = 1e-9 * static_cast<double>(frame.header.stamp_ns - reference->stamp_ns);
         const double weight = config_.settle_s > 0.0 ? std::clamp(age_s / config_.settle_s, 0.0, 1.0) : 1.0;
@@ -251,7 +282,8 @@ void FreeSpace::test(const Frame& frame, std::span<const Reference* const> refer
                                     (reference->T_world_sensor.inverse() * frame.odometry.T_world_sensor).cast<float>(),
                                     static_cast<float>(age_s),
                                     static_cast<float>(weight),
-                                    age_s > 0.0 && age_s <= config_.receding_s};
+                                    age_s > 0.0 && age_s <= config_.receding_s,
+                                    order++};
         int begin = 0;
         for (const std::uint32_t block_end : points.block_end) {
             const int end = static_cast<int>(block_end);

@@ -1,6 +1,7 @@
 // Free-space evidence: was the place of a return seen free, occupied, or not at all by earlier frames?
 #pragma once
 
+#include <array>
 #include <span>
 
 #include "core/evidence/reference_images.hpp"
@@ -21,6 +22,8 @@ struct FreeSpaceConfig {
     double receding_margin_m = 0.03;
     double receding_margin_per_m = 0.01;
     double min_receding_mps = 0.15;
+    double shift_margin_m = 0.02;
+    double shift_margin_per_m = 0.003;
 
     template <class V>
     void visit(V& v) {
@@ -45,11 +48,18 @@ struct FreeSpaceConfig {
         v.parameter("receding_margin_per_m", receding_margin_per_m, Range{0.0, 0.2}, "1",
                     "growth of that margin with range, as of the width that a direction is known to");
         v.parameter("min_receding_mps", min_receding_mps, Range{0.01, 10.0}, "m/s", "slower is not told from rest");
+        v.parameter("shift_margin_m", shift_margin_m, Range{0.005, 1.0}, "m",
+                    "a surface may have shifted where it lies by more than this outside of all that was seen around; "
+                    "lower looks at more places");
+        v.parameter("shift_margin_per_m", shift_margin_per_m, Range{0.0, 0.2}, "1", "growth of that margin with range");
     }
 };
 
 /// Points to be tested, sorted by block of columns (structure of arrays).
 struct CandidatePoints {
+    static constexpr std::size_t kShifts = 2;
+    static constexpr float kNoShift = 1e6F;
+
     AlignedVector<PixelIndex> pixel;
     AlignedVector<float> x, y, z;         ///< sensor frame at the stamp, deskewed
     AlignedVector<float> free, occupied;  ///< results: for how many references the place was free, and was occupied;
@@ -57,7 +67,12 @@ struct CandidatePoints {
     AlignedVector<float> gone;            ///< results: in how many references something hid the place that is gone now
     AlignedVector<float> came;            ///< results: how many recent references saw only farther surfaces there
     AlignedVector<float> slowest, fastest;  ///< speeds at which that can have moved away to here; none: it did not
-    std::vector<std::uint32_t> block_end;   ///< [Reference::kBlocks] end of each block's points
+    /// Results: by how much each point lies beyond the surface that the two newest references saw in its direction, by
+    /// the middle of their windows; kNoShift where they saw none.
+    std::array<AlignedVector<float>, kShifts> shift;
+    AlignedVector<float> outside;          ///< results: by how much it lies outside of the older one's window, beyond
+                                           ///< the margin; positive: farther
+    std::vector<std::uint32_t> block_end;  ///< [Reference::kBlocks] end of each block's points
     std::size_t size() const { return pixel.size(); }
 };
 
@@ -80,7 +95,8 @@ class FreeSpace {
         Eigen::Isometry3f T_reference_sensor;
         float age_s;
         float occupied_weight;
-        bool recent;  ///< what moves away is looked for
+        bool recent;        ///< what moves away is looked for
+        std::size_t order;  ///< among the references, newest first
     };
 
     void test_block(const Comparison& comparison, int begin, int n, CandidatePoints& points);

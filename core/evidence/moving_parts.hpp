@@ -61,6 +61,10 @@ class MovingParts {
     }
     /// Starts a frame.
     void begin() { state_.fill(kFresh); }
+    /// Pixels that belong to a part already.
+    void take(std::span<const PixelIndex> pixels) {
+        for (const PixelIndex pixel : pixels) state_[pixel] = kInPart;
+    }
 
   private:
     static std::span<const PixelIndex> pixels_of(const Frame& frame, const Segment& segment) {
