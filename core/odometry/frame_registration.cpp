@@ -55,7 +55,7 @@ bool Odometry::State::estimate(const Frame& frame) {
     if (bootstrapping) {
         bootstrap(frame);
     } else {
-        const double deviation = std::sqrt(filter.pose_covariance().diagonal().head<3>().sum());
+        const double deviation = predicted_deviation_m();
         const double widening = std::clamp(deviation / kSureDeviation_m, 1.0, kMaxWidening);
         register_frame(frame, widening > 1.0 ? kBootstrapIterations : config.scan_to_scan.iterations, widening);
     }
@@ -193,6 +193,7 @@ void Odometry::State::place_provisional() {
 /// Both stages: the first for the guess, the second for the pose. The filter's prediction is the prior of either.
 void Odometry::State::register_frame(const Frame& frame, int first_stage_iterations, double widening) {
     const PointSelection& points = frame.prepared.points;
+    const double predicted_m = predicted_deviation_m();
     filter.begin_update();
     matches.clear();
     held.begin_frame();
@@ -215,11 +216,18 @@ void Odometry::State::register_frame(const Frame& frame, int first_stage_iterati
                 [&](int) { scan_to_scan.match(points, excluded, placed, T_target_local, widening, matches); });
         update_sweep(frame);
     }
+    // The guess may be as far off as the prediction, or as the two disagree.
+    const double deviation_m = std::max(predicted_m, filter.correction().head<3>().norm());
     iterate(config.scan_to_submap.iterations, [&](int i) {
         scan_to_submap.match(points, excluded, placed, keyframes.submap(), origin, i == 0 ? 2.0 * widening : 1.0,
-                             matches);
+                             matches, deviation_m);
     });
     if (held.observability().unobservable() > 0) flags |= OdometryResult::kDegenerate;
+}
+
+/// Of the position before the update.
+double Odometry::State::predicted_deviation_m() const {
+    return std::sqrt(filter.pose_covariance().diagonal().head<3>().sum());
 }
 
 /// The motion over the sweep as the filter sees it now, and the points that take part after it.

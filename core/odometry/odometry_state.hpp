@@ -44,6 +44,7 @@ struct Odometry::State {
     MotionFilter likeliest_start(const Frame& frame, const MotionFilter& unmoved);
     void settle(const Frame& frame, int passes, int iterations_a_pass);
     void begin_again(const Frame& frame);
+    double predicted_deviation_m() const;
     double fit() const;
     bool first_scan_is_void() const;
     void place_provisional();

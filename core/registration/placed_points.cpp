@@ -35,6 +35,7 @@ void place_run(const float* __restrict first, const float* __restrict change, fl
     float* __restrict ox = a.ox;
     float* __restrict oy = a.oy;
     float* __restrict oz = a.oz;
+#pragma GCC ivdep
     for (std::size_t i = begin; i < end; ++i) {
         const float raw = (time[i] - start) * inverse_step;
         const float f = raw < 0.0F ? 0.0F : raw > 1.0F ? 1.0F : raw;

@@ -9,6 +9,11 @@ namespace {
 
 constexpr std::size_t kBatch = 64;  // points that are looked up before any is worked on
 
+// A kernel of so many standard deviations of the guess lets a body be found where it may be. Below the least one a
+// prediction that has missed a shock would no longer be put right.
+constexpr double kKernelDeviations = 2.0;
+constexpr double kLeastKernel_m = 0.05;
+
 inline float dot(const float a[3], const float b[3]) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
@@ -64,11 +69,13 @@ float distance_to_neighbours(VoxelMap& map, const Cell& cell, float side, float 
 
 void ScanToSubmap::match(const PointSelection& points, std::span<const std::uint8_t> excluded,
                          const PlacedPoints& placed, VoxelMap& map, VoxelIndex origin, double widening,
-                         PlaneMatches& matches) const {
+                         PlaneMatches& matches, double deviation_m) const {
     const auto side = static_cast<float>(map.voxel_m());
     const float inverse_side = 1.0F / side;
     const auto gate = static_cast<float>(config_.gate_m * widening);
-    const auto kernel = static_cast<float>(config_.kernel_m * widening);
+    const auto kernel = static_cast<float>(
+        std::clamp(kKernelDeviations * deviation_m, std::min(kLeastKernel_m, config_.kernel_m), config_.kernel_m) *
+        widening);
     const float inverse_kernel2 = 1.0F / (kernel * kernel);
     const auto min_cosine = static_cast<float>(config_.min_normal_cosine);
     matches.reserve(points.pixel.capacity());

@@ -5,6 +5,7 @@
 // distance along the voxel's normal over its thickness.
 #pragma once
 
+#include <limits>
 #include <span>
 
 #include "core/map/voxel_map.hpp"
@@ -44,8 +45,10 @@ class ScanToSubmap {
     /// @param placed the same points in the local frame: the world moved to the lower corner of voxel `origin`
     /// @param excluded by point, 1: weighs nothing; points beyond its end take no part
     /// @param widening factor on gate and kernel: above 1 while the guess is poor
+    /// @param deviation_m standard deviation of the guess's position, where it is known: the kernel need not be wider
     void match(const PointSelection& points, std::span<const std::uint8_t> excluded, const PlacedPoints& placed,
-               VoxelMap& map, VoxelIndex origin, double widening, PlaneMatches& matches) const;
+               VoxelMap& map, VoxelIndex origin, double widening, PlaneMatches& matches,
+               double deviation_m = std::numeric_limits<double>::infinity()) const;
 
     /// Distances of the points to the nearest Gaussian of the submap around them: the residuals of the registration.
     /// @param ground by pixel, 1: is ground and left out; nullptr: nothing is
