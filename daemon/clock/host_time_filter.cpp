@@ -20,13 +20,15 @@ void HostTimeFilter::add(std::int64_t sensor_ns, std::int64_t receive_ns) {
     // What is held back is added to the host's clock as if it had never been set back.
     const std::int64_t offset_ns = receive_ns + held_back_ns_ - sensor_ns;
     if (!initialized_) {
-        begin_sensor_ns_ = sensor_ns;
+        begin_sensor_ns_ = last_added_ns_ = sensor_ns;
         restart(sensor_ns, offset_ns);
         return;
     }
     const double sensor_s = static_cast<double>(sensor_ns - epoch_sensor_ns_) * 1e-9;
     const double offset_s = static_cast<double>(offset_ns - base_offset_ns_) * 1e-9;
     const double excess_s = offset_s - predicted_offset_s(sensor_s);
+    const bool sensor_went_back = sensor_ns < last_added_ns_ - kStepNs;
+    last_added_ns_ = sensor_ns;
 
     if (excess_s < -static_cast<double>(kStepNs) * 1e-9) {
         // Earlier than physics allows: the host's clock was set back, or the sensor's forward.
@@ -45,16 +47,20 @@ void HostTimeFilter::add(std::int64_t sensor_ns, std::int64_t receive_ns) {
         return;
     }
     if (excess_s > static_cast<double>(kStepNs) * 1e-9) {
-        // Either a delay, which passes, or a step, which stays.
-        if (!above_) {
+        // Either a delay, which passes, or a step, which stays; a sensor that starts anew counts from the beginning.
+        if (!above_ || sensor_went_back) {
             above_ = true;
             above_since_ns_ = sensor_ns;
             above_minimum_ns_ = offset_ns;
         }
         above_minimum_ns_ = std::min(above_minimum_ns_, offset_ns);
-        if (sensor_ns - above_since_ns_ < kStepHoldNs) return;
-        step_ = {true, static_cast<std::int64_t>(std::llround(excess_s * 1e9)), true};
-        restart(sensor_ns, above_minimum_ns_);
+        if (!sensor_went_back && sensor_ns - above_since_ns_ < kStepHoldNs) return;
+        const std::int64_t by_ns = std::llround(excess_s * 1e9);
+        // What was held back of an earlier step is let go: utime comes nearer to the host's time without going back.
+        const std::int64_t let_go_ns = sensor_went_back ? 0 : std::min(held_back_ns_, by_ns);
+        held_back_ns_ -= let_go_ns;
+        step_ = {true, by_ns, let_go_ns < by_ns};
+        restart(sensor_ns, above_minimum_ns_ - let_go_ns);
         return;
     }
     above_ = false;

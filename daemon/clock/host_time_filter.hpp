@@ -20,7 +20,8 @@ class HostTimeFilter {
     struct Step {
         bool happened = false;
         std::int64_t by_ns = 0;  ///< host minus sensor time, after minus before
-        bool followed = false;   ///< false: utime goes on along the old time scale, as it may never go backwards
+        bool followed = false;   ///< false: utime goes on along the old time scale: it may never go backwards, and
+                                 ///< makes up for that when the host's clock is set forward again
     };
 
     /// @param sensor_ns  sensor time of the packet's last column
@@ -60,6 +61,7 @@ class HostTimeFilter {
 
     bool initialized_ = false;
     std::int64_t begin_sensor_ns_ = 0;  ///< of the stream: until the hold time is over, all may have been delayed
+    std::int64_t last_added_ns_ = 0;    ///< sensor time of the packet added last
     std::int64_t epoch_sensor_ns_ = 0;
     std::int64_t base_offset_ns_ = 0;
     std::array<Minimum, kIntervals> minima_{};

@@ -103,7 +103,9 @@ void LiveSession::report_clock_step() {
     warnings_.warn(step.by_ns > 0 ? "clock step forward" : "clock step back",
                    fmt::format("the clocks of host and sensor moved by {:.3f} s against each other; utime {}",
                                1e-9 * static_cast<double>(step.by_ns),
-                               step.followed ? "follows" : "stays on the old scale, as it never goes back"));
+                               step.followed    ? "follows"
+                               : step.by_ns > 0 ? "stays, and is nearer to the host's time again"
+                                                : "stays on the old scale, as it never goes back"));
 }
 
 /// A service lives on when its disk is full.

@@ -153,6 +153,35 @@ TEST(HostTimeFilter, AClockSetBackByMoreThanAnyDelayIsAStepFromTheStart) {
     EXPECT_NEAR(static_cast<double>(step.by_ns) * 1e-9, -3600.0, 0.1);
 }
 
+TEST(HostTimeFilter, ASensorThatStartsAnewHasItsTimeAtOnce) {
+    const Simulation sim(0.0, 5);
+    HostTimeFilter filter;
+    for (int f = 0; f < 200; ++f) {
+        const bool restarted = f >= 100;
+        // Half a minute passes before it comes back, its clock at zero.
+        const std::int64_t host = Simulation::kHostEpoch + f * 100 * kMs + (restarted ? 30 * kSecond : 0);
+        const std::int64_t sensor = restarted ? (f - 99) * 100 * kMs : sim.sensor_ns(host);
+        filter.add(sensor, host);
+        EXPECT_NEAR(static_cast<double>(filter.next_stamp_ns(sensor) - host) * 1e-6, 0.0, 1.0) << f;
+        EXPECT_EQ(filter.take_step().happened, f == 100);
+    }
+}
+
+TEST(HostTimeFilter, AClockSetBackAndForthLeavesTheHostsTime) {
+    Simulation sim(0.0, 5);
+    HostTimeFilter filter;
+    std::int64_t last = 0;
+    for (int f = 0; f < 300; ++f) {
+        const std::int64_t host = Simulation::kHostEpoch + f * 100 * kMs;
+        const std::int64_t set = f >= 100 && f < 200 ? -3600 * kSecond : 0;
+        filter.add(sim.sensor_ns(host), host + set + sim.delay_ns());
+        const std::int64_t stamp = filter.next_stamp_ns(sim.sensor_ns(host));
+        EXPECT_GT(stamp, last);
+        EXPECT_NEAR(static_cast<double>(stamp - host) * 1e-6, 0.0, 35.0) << f;
+        last = stamp;
+    }
+}
+
 TEST(HostTimeFilter, AStepBackLaterOnIsOneHoweverSmall) {
     Simulation sim(0.0, 5);
     HostTimeFilter filter;
