@@ -1,5 +1,7 @@
 // Command line of dlod.
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <csignal>
 #include <cstdio>
 #include <dlod/command_t.hpp>
 #include <exception>
@@ -51,6 +53,7 @@ int fail(ExitCode code, const std::exception& error) {
 int main(int argc, char** argv) {
     using namespace dlod::daemon;
     prefer_huge_pages();
+    std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files is an error of the file, not the end
     CLI::App app("Dynamic LiDAR odometry: pose, moving points and tracks from an Ouster lidar, over LCM.", "dlod");
     app.set_version_flag("--version", "dlod " DLOD_VERSION);
     app.require_subcommand(1);
@@ -124,6 +127,13 @@ int main(int argc, char** argv) {
     print_command->add_option("--metadata", printed_metadata, "with this sensor's preset");
 
     for (auto* command : app.get_subcommands({})) command->footer(kExitCodes);
+    const auto known = app.get_subcommands({});
+    if (argc > 1 && argv[1][0] != '-' && std::none_of(known.begin(), known.end(), [&](const CLI::App* command) {
+            return command->check_name(argv[1]);
+        })) {
+        std::fprintf(stderr, "dlod: there is no command '%s'; dlod --help lists them\n", argv[1]);
+        return static_cast<int>(ExitCode::kUsage);
+    }
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

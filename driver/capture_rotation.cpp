@@ -25,12 +25,13 @@ struct Numbered {
 /// PREFIX_NUMBER_TIME.pcap, oldest first.
 std::vector<Numbered> list_captures(const std::filesystem::path& folder, const std::string& prefix) {
     std::vector<Numbered> all;
-    std::error_code error;
-    for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-        const std::string name = entry.path().filename().string();
-        if (!name.starts_with(prefix + "_") || entry.path().extension() != kExtension) continue;
+    std::error_code error;  // a disk that fails in between ends the list, not the program
+    for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end;
+         entry.increment(error)) {
+        const std::string name = entry->path().filename().string();
+        if (!name.starts_with(prefix + "_") || entry->path().extension() != kExtension) continue;
         const char* const digits = name.data() + prefix.size() + 1;
-        Numbered capture{0, entry.path()};
+        Numbered capture{0, entry->path()};
         const auto parsed = std::from_chars(digits, name.data() + name.size(), capture.number);
         if (parsed.ec == std::errc{} && *parsed.ptr == '_') all.push_back(std::move(capture));
     }

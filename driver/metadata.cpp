@@ -2,8 +2,10 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
 #include <cmath>
+#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
@@ -389,7 +391,7 @@ SensorInfo parse_metadata(std::string_view json, const std::string& name) {
     try {
         root = Json::parse(json);
     } catch (const Json::exception& error) {
-        throw MetadataError(name + ": not a JSON file: " + error.what());
+        throw MetadataError(name + ": not a JSON file: " + printable(error.what(), 300));
     }
     if (!root.is_object()) throw MetadataError(name + ": the outermost value must be an object");
     SensorInfo info;
@@ -414,11 +416,19 @@ SensorInfo parse_metadata(std::string_view json, const std::string& name) {
     return info;
 }
 
-SensorInfo load_metadata(const std::filesystem::path& path) {
+std::string read_metadata(const std::filesystem::path& path) {
+    if (std::filesystem::is_directory(path)) {
+        throw MetadataError(path.string() + ": is a folder, not the sensor's metadata file");
+    }
     std::ifstream file(path, std::ios::binary);
-    const std::string content{std::istreambuf_iterator<char>(file), {}};
-    if (!file.good() && !file.eof()) throw MetadataError(path.string() + ": cannot be read");
-    return parse_metadata(content, path.string());
+    if (!file) throw MetadataError(path.string() + ": cannot be read: " + std::strerror(errno));
+    std::string content{std::istreambuf_iterator<char>(file), {}};
+    if (content.empty()) throw MetadataError(path.string() + ": is empty");
+    return content;
+}
+
+SensorInfo load_metadata(const std::filesystem::path& path) {
+    return parse_metadata(read_metadata(path), path.string());
 }
 
 }  // namespace dlod::driver

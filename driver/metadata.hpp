@@ -56,6 +56,9 @@ struct SensorInfo {
 /// @throws MetadataError
 SensorInfo parse_metadata(std::string_view json, const std::string& name);
 
+/// A metadata file's content, which is not empty. @throws MetadataError where it cannot be read
+std::string read_metadata(const std::filesystem::path& path);
+
 /// parse_metadata of a file's content.
 /// @throws MetadataError  also where the file cannot be read
 SensorInfo load_metadata(const std::filesystem::path& path);

@@ -80,7 +80,7 @@ class LiveSession {
     RepeatedWarnings warnings_;
     ServiceNotifier service_;
     driver::Counter output_failures_;
-    std::int8_t last_health_ = status_t::WAITING;
+    std::int8_t last_health_ = -1;  ///< none yet: the first one is logged
     Pipeline pipeline_;                       // its threads use all of the above
     std::unique_ptr<RemoteControl> control_;  // last: its thread uses the pipeline
 };

@@ -123,10 +123,18 @@ struct PipelineConfig {
         v.parameter("waiting_frames", waiting_frames, Range{1, 64}, "frames",
                     "live: frames that may wait for the first stage, one more drops the oldest; higher loses less and "
                     "delays more");
-        v.list_of("pin_to_cpus", pin_to_cpus, Range{0, 1023}, "CPU", "CPUs that the threads may run on; empty: all");
+        v.list_of("pin_to_cpus", pin_to_cpus, Range{0, 1023}, "CPU",
+                  "CPUs that the threads may run on, all of them on any of these; empty: all. Worth it where other "
+                  "programs are "
+                  "kept off these CPUs, else it only takes choice from the scheduler");
         v.parameter("realtime_priority", realtime_priority, Range{0, 99}, "1",
-                    "SCHED_FIFO priority of a live run's threads; 0: ordinary scheduling");
-        v.flag("lock_memory", lock_memory, "keep a live run's memory from being paged out");
+                    "SCHED_FIFO priority of a live run's threads, before whatever has none; the service has the right "
+                    "to it, by "
+                    "hand CAP_SYS_NICE is needed; 0: ordinary scheduling");
+        v.flag("lock_memory", lock_memory,
+               "keep a live run's memory from being paged out, once used; takes neither more memory nor time, and is "
+               "worth "
+               "it on computers that swap");
     }
 };
 

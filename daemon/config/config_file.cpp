@@ -130,7 +130,9 @@ void apply_yaml(Config& config, const std::string& yaml, const std::string& name
         const YAML::Node root = YAML::Load(yaml);
         if (!root.IsNull()) apply_map(options, root, "", name);
     } catch (const YAML::Exception& error) {
-        fail(name, error.mark, fmt::format("not valid YAML: {}", error.msg));
+        const bool tabs = yaml.find("\n\t") != std::string::npos;
+        fail(name, error.mark,
+             fmt::format("not valid YAML: {}{}", error.msg, tabs ? "; indent with spaces, not tabs" : ""));
     }
 }
 

@@ -201,14 +201,13 @@ std::string nearest_key(const OptionList& options, std::string_view key) {
     std::size_t best_distance = static_cast<std::size_t>(-1);
     for (const auto& entry : options) {
         const auto* option = std::get_if<Option>(&entry);
-        if (option == nullptr) continue;
         // A right name in the wrong group is nearer than a wrong name in the right one.
-        const std::string_view known = option->key;
+        const std::string_view known = option != nullptr ? option->key : std::get<OptionGroup>(entry).prefix;
         const std::size_t distance =
             std::min(edit_distance(known, key), 1 + edit_distance(known.substr(known.rfind('.') + 1), leaf));
         if (distance < best_distance) {
             best_distance = distance;
-            best = option->key;
+            best = known;
         }
     }
     return best;

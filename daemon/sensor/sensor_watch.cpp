@@ -5,8 +5,6 @@
 
 #include <algorithm>
 #include <condition_variable>
-#include <fstream>
-#include <iterator>
 #include <mutex>
 #include <utility>
 
@@ -155,7 +153,7 @@ class SensorWatch::Worker {
             fall_back_on_cache(config.host);
             // A sensor whose packets come may keep its web server to itself.
             if (stream() != Stream::kGood || !in_force_) trouble = error.what();
-        } catch (const driver::MetadataError& error) {
+        } catch (const std::exception& error) {  // metadata that are none, or whatever else an answer brings about
             trouble = error.what();
         }
         const std::lock_guard lock(mutex_);
@@ -316,12 +314,7 @@ std::optional<SensorMetadata> configured_metadata(const SensorConfig& config) {
             "no sensor is named: set sensor.host, its name or address, in the configuration, or sensor.metadata, a "
             "file");
     }
-    std::ifstream file(config.metadata, std::ios::binary);
-    std::string json{std::istreambuf_iterator<char>(file), {}};
-    if (!file || json.empty()) {
-        throw driver::MetadataError(
-            fmt::format("{}: cannot be read; set sensor.metadata to the sensor's metadata file", config.metadata));
-    }
+    std::string json = driver::read_metadata(config.metadata);
     driver::parse_metadata(json, config.metadata);
     return SensorMetadata{std::move(json), config.metadata};
 }

@@ -179,6 +179,21 @@ TEST(Metadata, WhatIsNotNeededIsAWarning) {
     EXPECT_EQ(info.serial(), 0U);
 }
 
+TEST(Metadata, WhatIsNoMetadataFileIsNamed) {
+    const auto error_of_file = [](const std::filesystem::path& path) {
+        try {
+            load_metadata(path);
+            return std::string();
+        } catch (const MetadataError& error) {
+            return std::string(error.what());
+        }
+    };
+    EXPECT_EQ(error_of_file("/"), "/: is a folder, not the sensor's metadata file");
+    EXPECT_EQ(error_of_file("/nowhere/a.json"), "/nowhere/a.json: cannot be read: No such file or directory");
+    EXPECT_EQ(error_of_file("/dev/null"), "/dev/null: is empty");
+    EXPECT_EQ(error_of("\xff\n\x1b\x01").find_first_of("\n\x1b\x01"), std::string::npos);
+}
+
 TEST(Metadata, TextsAreFitForTheLog) {
     json metadata = json::parse(synthetic_metadata({}));
     metadata["sensor_info"]["build_rev"] = "v3.1.0\nMAINPID=1\x1b[31m\u00e9" + std::string(100'000, 'x');

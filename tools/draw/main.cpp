@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "daemon/commands/load_config.hpp"
+#include "tools/command_line.hpp"
 #include "tools/draw/colors.hpp"
 #include "tools/draw/frame_pictures.hpp"
 #include "tools/draw/map_picture.hpp"
@@ -110,7 +111,7 @@ int main(int argc, char** argv) {
     app.add_option("--beside", arguments.beside, "output folder of another run, drawn from above beside the first")
         ->check(CLI::ExistingDirectory);
     app.add_option("--beside-title", arguments.beside_title, "its caption; default: its folder");
-    CLI11_PARSE(app, argc, argv);
+    if (const auto code = dlod::tools::parse_command_line(app, argc, argv)) return *code;
     if (arguments.metadata.empty())
         arguments.metadata = std::filesystem::path(arguments.capture).replace_extension(".json");
     try {

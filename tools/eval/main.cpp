@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "tools/command_line.hpp"
 #include "tools/eval/evaluation.hpp"
 
 namespace {
@@ -40,7 +41,7 @@ int main(int argc, char** argv) {
         ->capture_default_str();
     app.add_option("--errors", errors_file, "also write the pose errors over time to this CSV file");
     app.add_flag("--json", json, "JSON instead of text");
-    CLI11_PARSE(app, argc, argv);
+    if (const auto code = dlod::tools::parse_command_line(app, argc, argv)) return *code;
     try {
         const dlod::tools::Truth truth(truth_folder);
         const auto evaluation = evaluate(truth, dlod::tools::RunOutput(run_folder), options);

@@ -9,6 +9,8 @@
 #include <map>
 #include <string>
 
+#include "tools/command_line.hpp"
+
 namespace {
 
 std::atomic<bool> interrupted{false};
@@ -48,7 +50,7 @@ int main(int argc, char** argv) {
     double seconds = 0.0;
     app.add_option("--lcm", url, "LCM provider; default: LCM's own");
     app.add_option("--seconds", seconds, "end after this time")->check(CLI::NonNegativeNumber);
-    CLI11_PARSE(app, argc, argv);
+    if (const auto code = dlod::tools::parse_command_line(app, argc, argv)) return *code;
 
     lcm::LCM lcm(url);
     Listener listener;

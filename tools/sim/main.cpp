@@ -17,6 +17,7 @@
 
 #include "driver/network_address.hpp"
 #include "driver/pcap_writer.hpp"
+#include "tools/command_line.hpp"
 #include "tools/sim/drive.hpp"
 #include "tools/sim/live_sender.hpp"
 #include "tools/sim/sensor_metadata.hpp"
@@ -291,7 +292,7 @@ int main(int argc, char** argv) {
     CLI::App app{"Simulates a drive with an Ouster lidar through a scene, with its full truth."};
     Options options;
     add_options(app, options);
-    CLI11_PARSE(app, argc, argv);
+    if (const auto code = dlod::tools::parse_command_line(app, argc, argv)) return *code;
     std::signal(SIGINT, interrupt);
     std::signal(SIGTERM, interrupt);
     try {

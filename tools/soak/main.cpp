@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "driver/metadata.hpp"
+#include "tools/command_line.hpp"
 #include "tools/eval/truth.hpp"
 #include "tools/soak/accuracy.hpp"
 #include "tools/soak/faulty_sensor.hpp"
@@ -234,7 +235,7 @@ int main(int argc, char** argv) {
     app.add_option("--most-position-error", options.most_position_error, "largest, per that of the reference")
         ->capture_default_str();
     app.add_option("--most-latency", options.most_latency_ms, "p99, ms")->capture_default_str();
-    CLI11_PARSE(app, argc, argv);
+    if (const auto code = dlod::tools::parse_command_line(app, argc, argv)) return *code;
     try {
         return dlod::tools::soak::run(options);
     } catch (const std::exception& error) {

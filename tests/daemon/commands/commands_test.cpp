@@ -71,6 +71,7 @@ TEST_F(CommandsTest, ReplayWritesTheFolderAndASummary) {
 }
 
 TEST_F(CommandsTest, HelpAndVersion) {
+    EXPECT_TRUE(ends(dlod({"rum"}), 2, {"'rum'", "--help"}));
     EXPECT_TRUE(ends(dlod({"--version"}), 0, {"dlod "}));
     EXPECT_TRUE(
         ends(dlod({"--help"}), 0, {"replay", "run", "info", "doctor", "check-config", "print-config", "Exit codes"}));

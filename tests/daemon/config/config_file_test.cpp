@@ -71,6 +71,8 @@ TEST(ConfigFile, AnEmptyFileAndEmptyGroupsChangeNothing) {
 TEST(ConfigFile, ErrorsNameFileLineAndKey) {
     EXPECT_TRUE(has(error_of("lcm:\n  url: none\npipeline:\n  thread: 3\n"),
                     {"robot.yaml:4", "'pipeline.thread'", "nearest", "'pipeline.threads'"}));
+    EXPECT_TRUE(has(error_of("pipelin: {threads: 3}\n"), {"'pipelin'", "nearest", "'pipeline'"}));
+    EXPECT_TRUE(has(error_of("pipeline:\n\tthreads: 3\n"), {"robot.yaml:", "spaces, not tabs"}));
     EXPECT_TRUE(has(error_of("threads: 3\n"), {"robot.yaml:1", "'threads'", "'pipeline.threads'"}));
     EXPECT_TRUE(has(error_of("pipeline:\n  threads: 0\n"),
                     {"robot.yaml:2", "pipeline.threads", "0 is out of range", "1 to 64"}));
