@@ -23,9 +23,6 @@ constexpr std::size_t kQueueLength = 1;
 /// The map stage has nothing to do most of the time.
 constexpr auto kClaimRetry = std::chrono::milliseconds(1);
 
-/// Live: a pose that is older than so many turns of the sensor is of no use to a planner.
-constexpr double kMostLatencyPeriods = 2.0;
-
 std::size_t pool_size(const PipelineOptions& options) {
     if (options.live) return kLiveFrames + static_cast<std::size_t>(options.waiting_frames);
     return options.threads == 1 && !options.paced ? kSingleThreadFrames : kReplayFrames;
@@ -48,7 +45,7 @@ Pipeline::Pipeline(const driver::SensorInfo& sensor, const MethodConfig& method,
       sinks_(std::move(sinks)),
       options_(std::move(options)),
       done_descriptor_(make_event_descriptor()),
-      admission_(options_.live ? std::llround(kMostLatencyPeriods * 1e9 * sensor.model.frame_period_s) : 0),
+      admission_(options_.live ? std::llround(options_.most_latency_turns * 1e9 * sensor.model.frame_period_s) : 0),
       pool_(sensor.model, pool_size(options_)),
       to_prepare_(pool_.size()),
       to_odometry_(kQueueLength),

@@ -33,7 +33,9 @@ struct FrameSinks {
 
 struct PipelineOptions {
     int threads = 2;
-    int waiting_frames = 2;        ///< live: more than these are dropped, oldest first; so are those that would be late
+    int waiting_frames = 2;  ///< live: more than these are dropped, oldest first; so are those that would be late
+    double most_latency_turns = 2.0;  ///< live: a pose older than so many turns of the sensor is of no use to a
+                                      ///< planner; 0: no frame is left out for being late
     bool live = false;             ///< receive on a thread of its own, never wait for the stages
     bool paced = false;            ///< replay in time: the source waits for packets, on a thread of its own
     driver::BodyFilter body = {};  ///< of the robot itself

@@ -27,7 +27,6 @@ auto sensor_is(const std::string& text) {
 }
 
 TEST(SensorChanges, AwaitedUnpluggedRestartedAndReplaced) {
-    if (test::kTooSlowForTimes) GTEST_SKIP() << "ThreadSanitizer is too slow for this";
     LiveRun run;
     if (!run.usable()) GTEST_SKIP() << "no multicast here";
     FakeSensor sensor(on_live_ports());
@@ -38,8 +37,8 @@ TEST(SensorChanges, AwaitedUnpluggedRestartedAndReplaced) {
 
     sensor.plug_in();
     EXPECT_TRUE(run.poses_flow());
-    // A frame dropped on a busy machine is remembered for ten seconds.
-    EXPECT_TRUE(run.status_says(health(status_t::OK, ""), 25s));
+    // A frame dropped on a busy machine is remembered for ten seconds; under ThreadSanitizer, some always are.
+    EXPECT_TRUE(test::kTooSlowForTimes || run.status_says(health(status_t::OK, ""), 25s));
 
     sensor.restart();
     EXPECT_TRUE(run.poses_flow()) << "after a restart: init id, clock and frame ids begin anew";
@@ -54,15 +53,19 @@ TEST(SensorChanges, AwaitedUnpluggedRestartedAndReplaced) {
     EXPECT_TRUE(run.status_says(sensor_is("OS-0-32 222")));
     EXPECT_TRUE(run.poses_flow()) << "another of the same model";
 
-    sensor.become(on_live_ports({.rows = 64, .columns = 1024, .serial_number = 333}));
+    const int columns = test::kTooSlowForTimes ? 512 : 1024;
+    sensor.become(on_live_ports({.rows = 64, .columns = columns, .serial_number = 333}));
     EXPECT_TRUE(run.status_says(sensor_is("OS-0-64 333")));
     EXPECT_TRUE(run.poses_flow()) << "another model";
 
-    sensor.become(on_live_ports({.rows = 64, .columns = 1024, .serial_number = 333, .firmware = "v3.1.0"}));
+    sensor.become(on_live_ports({.rows = 64, .columns = columns, .serial_number = 333, .firmware = "v3.1.0"}));
     EXPECT_TRUE(run.status_says(sensor_is("v3.1.0")));
     EXPECT_TRUE(run.poses_flow());
     EXPECT_TRUE(run.status_says(
-        [](const status_t& s) { return test::counter(s, "sensor_changes") == 3 && s.health == 0; }, 25s));
+        [](const status_t& s) {
+            return test::counter(s, "sensor_changes") == 3 && (test::kTooSlowForTimes || s.health == 0);
+        },
+        25s));
     EXPECT_EQ(run.systemd.messages().find("STOPPING"), std::string::npos);
     run.stop();
 }

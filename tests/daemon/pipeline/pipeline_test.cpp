@@ -10,6 +10,7 @@
 #include "daemon/output/result_writer.hpp"
 #include "driver/paced_source.hpp"
 #include "driver/pcap_source.hpp"
+#include "tests/support/cpu_wait.hpp"
 #include "tests/support/file_content.hpp"
 #include "tests/support/sanitizers.hpp"
 #include "tests/support/synthetic_capture.hpp"
@@ -232,7 +233,6 @@ class ImpatientSource final : public driver::PacketSource {
 };
 
 TEST_F(PipelineTest, LiveTheNewestFramesWinAndEveryDropIsCounted) {
-    if (test::kTooSlowForTimes) GTEST_SKIP() << "ThreadSanitizer is too slow for this";
     const test::SyntheticCapture capture(60);
     ImpatientSource source(capture);
     std::vector<std::uint64_t> written;
@@ -243,7 +243,9 @@ TEST_F(PipelineTest, LiveTheNewestFramesWinAndEveryDropIsCounted) {
         imu_samples += frame.imu.size();
         ::poll(nullptr, 0, 20);
     };
-    Pipeline pipeline(sensor_, {}, {}, source, std::move(sinks), {.threads = 2, .waiting_frames = 1, .live = true});
+    // Without a bound on the latency: on a busy machine even the newest frame may come too late for that.
+    Pipeline pipeline(sensor_, {}, {}, source, std::move(sinks),
+                      {.threads = 2, .waiting_frames = 1, .most_latency_turns = 0.0, .live = true});
     pipeline.start();
     wait_until_done(pipeline);
     pipeline.rethrow_failure();
@@ -266,6 +268,7 @@ TEST_F(PipelineTest, LiveWithHalfTheTimeItNeedsLatencyIsBounded) {
     if (test::kTooSlowForTimes) GTEST_SKIP() << "ThreadSanitizer is too slow for this";
     driver::PacedSource source(std::make_unique<driver::PcapSource>(capture_), 1.0);
     std::vector<float> latencies_ms;
+    std::vector<std::int64_t> cpu_waits_ns;
     std::vector<std::uint64_t> poses;
     std::vector<std::uint64_t> published;
     FrameSinks sinks;
@@ -277,6 +280,7 @@ TEST_F(PipelineTest, LiveWithHalfTheTimeItNeedsLatencyIsBounded) {
     sinks.finished = [&](const PipelineFrame& frame) {
         EXPECT_LE(frame.pose_latency_ms + 150.0F, frame.latency_ms) << "poses do not wait for the rest";
         latencies_ms.push_back(frame.latency_ms);
+        cpu_waits_ns.push_back(test::cpu_wait_ns());
     };
     Pipeline pipeline(sensor_, {}, {}, source, std::move(sinks), {.threads = 2, .live = true});
     pipeline.start();
@@ -287,7 +291,11 @@ TEST_F(PipelineTest, LiveWithHalfTheTimeItNeedsLatencyIsBounded) {
     EXPECT_EQ(poses, published);
     // The first ones teach what to expect.
     ASSERT_GT(latencies_ms.size(), 8U);
-    for (std::size_t i = 6; i < latencies_ms.size(); ++i) EXPECT_LT(latencies_ms[i], 230.0F) << "frame " << i;
+    for (std::size_t i = 6; i < latencies_ms.size(); ++i) {
+        // Three frames may be at work or wait: what held up others while this one lived held it up, too.
+        const double held_up_ms = 1e-6 * static_cast<double>(cpu_waits_ns[i] - cpu_waits_ns[i - 3]);
+        EXPECT_LT(latencies_ms[i], 230.0 + held_up_ms) << "frame " << i << ", without the CPU for " << held_up_ms;
+    }
 }
 
 }  // namespace
