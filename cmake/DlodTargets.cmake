@@ -1,4 +1,4 @@
-# dlod_add_library(NAME GLOB... LINK libs...): a static library of all sources that match, Eigen precompiled.
+# dlod_add_library(NAME SOURCES files... LINK libs... PCH headers...): a static library, with these headers precompiled.
 function(dlod_add_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINK;PCH" ${ARGN})
   add_library(${name} STATIC ${ARG_SOURCES})
@@ -21,6 +21,15 @@ function(dlod_add_test_folder folder)
   target_link_libraries(test_${name} PRIVATE ${ARG_LINK} dlod_test_main)
   # The tests' own code compiles a quarter faster so; what they test is optimised in full.
   target_compile_options(test_${name} PRIVATE $<$<CONFIG:Release>:-O1>)
+  # The first program's precompiled headers serve all: that one has no definitions that others lack.
+  get_property(precompiled GLOBAL PROPERTY dlod_test_precompiled)
+  if(precompiled)
+    target_precompile_headers(test_${name} REUSE_FROM ${precompiled})
+  else()
+    target_precompile_headers(test_${name} PRIVATE <gtest/gtest.h> <Eigen/Dense> <Eigen/Geometry> <algorithm> <array>
+                              <chrono> <cmath> <filesystem> <fstream> <functional> <map> <memory> <random> <string> <vector>)
+    set_property(GLOBAL PROPERTY dlod_test_precompiled test_${name})
+  endif()
   string(REGEX MATCH "^[^/]+" top ${folder})
   if(NOT TARGET tests_${top})
     add_custom_target(tests_${top})
