@@ -160,7 +160,10 @@ void Detector::State::complete(Frame& frame) {
 
 void Detector::State::detect(Frame& frame) {
     const Preparation& prepared = frame.prepared;
-    for (std::size_t k = 0; k < plates.size(); ++k) add(frame, prepared.segment[plates[k].front()] - 1, plates[k]);
+    for (std::size_t k = 0; k < plates.size(); ++k) {
+        add(frame, prepared.segment[plates[k].front()] - 1, plates[k]);
+        frame.detection.detections.back().turned = true;
+    }
     for (std::size_t s = 0; s < prepared.segments.size(); ++s) {
         const Segment& segment = prepared.segments[s];
         if (config.use_free_space && is_divided(segment, counts[s])) {

@@ -123,6 +123,9 @@ DynamicState MotionBelief::fused(const MotionCues& cues, const DynamicStateConfi
     }
     // It moves where it has hidden the space, or been itself: what that space said against motion is taken back.
     if (cues.left_its_place) log_odds_ = std::max(log_odds_, 0.0);
+    // Hundreds of points compared with two earlier frames, not one detection's guess: that decides alone.
+    const bool sure = config.use_free_space && cues.turned;
+    if (sure) log_odds_ = std::max(log_odds_, config.dynamic_log_odds);
     log_odds_ = std::clamp(log_odds_ + step, config.static_log_odds - 0.5, kMaxLogOdds);
     rest(cues, config);
     if (state_ == DynamicState::kDynamic) {
@@ -146,7 +149,7 @@ DynamicState MotionBelief::fused(const MotionCues& cues, const DynamicStateConfi
         anchor_m_ = cues.position_m;
         log_odds_ = std::max(log_odds_, config.dynamic_log_odds);
     }
-    if (log_odds_ >= config.dynamic_log_odds && detections_ >= config.min_hits) {
+    if (log_odds_ >= config.dynamic_log_odds && (sure || detections_ >= config.min_hits)) {
         rest_s_ = 0.0;
         dynamic_s_ = 0.0;
         anchor_m_ = cues.position_m;

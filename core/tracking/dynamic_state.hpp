@@ -18,6 +18,7 @@ struct MotionCues {
     int free_points = 0;      ///< pixels where earlier frames saw free space
     int occupied_points = 0;  ///< pixels where they saw a surface
     int unknown_points = 0;
+    bool turned = false;   ///< a plane that has turned since two earlier frames
     double shift_m = 0.0;  ///< of what is seen, from where the track began, ground plane: both ends of its box
     double displacement_log_odds = 0.0;   ///< of "moved" against "stayed", from the registration of its own points
     bool sustained_displacement = false;  ///< it has agreed with the filtered velocity for a while

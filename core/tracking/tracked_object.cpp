@@ -170,6 +170,7 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
         cues.free_points += part.free_points;
         cues.occupied_points += part.occupied_points;
         cues.unknown_points += part.unknown_points;
+        cues.turned = cues.turned || part.turned;
         points_ += static_cast<int>(part.count);
     }
     cues.average_residual_m = cues.residual_points > 0 ? residual_sum / cues.residual_points : 0.0;

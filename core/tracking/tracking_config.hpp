@@ -98,7 +98,7 @@ struct DynamicStateConfig {
                     "the paper's rule: shift of both ends from the first position before an object may be dynamic");
         v.parameter("min_hits", min_hits, Range{1, 100}, "frames",
                     "detections before an object may be dynamic when cues are fused");
-        v.parameter("dynamic_log_odds", dynamic_log_odds, Range{0.1, 50.0}, "1",
+        v.parameter("dynamic_log_odds", dynamic_log_odds, Range{0.1, 8.0}, "1",
                     "log-odds of motion at which a track becomes dynamic; higher is later and surer");
         v.parameter("static_log_odds", static_log_odds, Range{-50.0, -0.1}, "1",
                     "log-odds of motion at which an undecided track becomes static");
