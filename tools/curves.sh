@@ -29,5 +29,5 @@ echo "over the residual threshold (residual alone, as in the paper):"
 curve residual_threshold tracking.state.theta_res 'residual threshold theta_res' '0.05 0.1 0.15 0.2 0.3 0.4 0.6 0.8' \
     --set detection.use_free_space=false --set tracking.state.use_free_space=false --set tracking.state.use_displacement=false
 echo "over the evidence threshold (all cues):"
-curve evidence_threshold tracking.state.dynamic_log_odds 'log-odds at which a track is dynamic' '0.5 1 2 3 4 6 8 12'
+curve evidence_threshold tracking.state.dynamic_log_odds 'log-odds at which a track is dynamic' '0.5 1 1.5 2 2.6 3.2 4 5 6 7'
 echo "written: $out/residual_threshold.csv, .svg and $out/evidence_threshold.csv, .svg"
