@@ -201,5 +201,26 @@ TEST_F(GlobalMapTest, PiecesOfALargeMovingObjectLeaveNoTrace) {
     }
 }
 
+/// Nor do they where its front alone is known.
+TEST_F(GlobalMapTest, WhatFollowsTheFrontOfAMovingVehicleLeavesNoTrace) {
+    GlobalMap map(sensor, config);
+    for (int k = 0; k < 40; ++k) {
+        see_wall();
+        Track front;
+        front.state = DynamicState::kDynamic;
+        front.box.center_m = {5.0, 4.0, 0.0};
+        front.box.yaw_rad = 1.5707963;
+        front.box.size_m = {4.0, 2.5, 3.2};
+        front.velocity_mps = {0.0, 5.0, 0.0};
+        front.points = 100;
+        scene.frame.detection.tracks = {front};
+        map.update(scene.frame);
+    }
+    map.finish();
+    int above_ground = 0;
+    for (const MapPoint& p : map.points()) above_ground += p.z > -1.4F ? 1 : 0;
+    EXPECT_EQ(above_ground, 0);
+}
+
 }  // namespace
 }  // namespace dlod
