@@ -26,7 +26,9 @@ constexpr std::size_t kPacketsPerFrame = kSmall ? 32 : 64;
 #ifdef DLOD_SIM_BINARY
 std::vector<std::string> simulator_of(std::size_t frames, const std::vector<std::string>& more) {
     std::vector<std::string> command = {DLOD_SIM_BINARY, "square", "--frames", std::to_string(frames)};
-    if (kSmall) command.insert(command.end(), {"--sensor", "OS0-32", "--mode", "512x10", "--rate", "0.1"});
+    if (kSmall)
+        command.insert(command.end(),
+                       {"--sensor", "OS0-32", "--mode", "512x10", "--profile", "RNG15_RFL8_NIR8", "--rate", "0.1"});
     command.insert(command.end(), more.begin(), more.end());
     return command;
 }
