@@ -50,7 +50,6 @@ TEST_F(Faults, KilledAndStartedAgainWhileTheSensorsWebServerIsAway) {
 }
 
 TEST_F(Faults, StoppedForThreeSeconds) {
-    if (test::leaves_out_small_forms()) GTEST_SKIP() << "set DLOD_TEST_SMALL_FORMS to run it";
     run.start();
     EXPECT_TRUE(run.poses_flow());
     run.daemon->signal(SIGSTOP);

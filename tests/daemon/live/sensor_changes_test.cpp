@@ -27,7 +27,6 @@ auto sensor_is(const std::string& text) {
 }
 
 TEST(SensorChanges, AwaitedUnpluggedRestartedAndReplaced) {
-    if (test::leaves_out_small_forms()) GTEST_SKIP() << "set DLOD_TEST_SMALL_FORMS to run it";
     LiveRun run;
     if (!run.usable()) GTEST_SKIP() << "no multicast here";
     FakeSensor sensor(on_live_ports());

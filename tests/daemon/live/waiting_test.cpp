@@ -8,7 +8,6 @@
 
 #include "tests/daemon/live/live_run.hpp"
 #include "tests/support/fake_sensor.hpp"
-#include "tests/support/sanitizers.hpp"
 
 namespace dlod {
 namespace {
@@ -31,7 +30,6 @@ Answer tell(const LiveRun& run, const std::vector<std::string>& command) {
 }
 
 TEST(Waiting, CommandsAreAnsweredBeforeAndAfterTheSensorHasCome) {
-    if (test::leaves_out_small_forms()) GTEST_SKIP() << "set DLOD_TEST_SMALL_FORMS to run it";
     LiveRun run;
     if (!run.usable()) GTEST_SKIP() << "no multicast here";
     test::FakeSensor sensor(test::on_live_ports());
