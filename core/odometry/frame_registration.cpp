@@ -1,5 +1,6 @@
 // Registration of a frame in two stages, with the motion over its sweep.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -23,6 +24,9 @@ constexpr int kBootstrapPasses = 4;
 constexpr int kBootstrapIterations = 10;
 // A robot that stands, or nearly, sees so much of its first scan again.
 constexpr double kSameViewShare = 0.85;
+// For the same: surfaces by the direction that they face in the plan, and points of one that make it count.
+constexpr std::size_t kViewDirections = 4;
+constexpr double kMinViewPoints = 20.0;
 // What a robot may be at when it is switched on: velocities to begin with, in eight directions of the horizontal plane.
 constexpr double kFirstSpeeds_mps[] = {5.0, 10.0, 15.0};
 constexpr int kFirstDirections = 8;
@@ -96,12 +100,33 @@ std::size_t Odometry::State::taking_part(const PointSelection& points) {
 void Odometry::State::bootstrap(const Frame& frame) {
     const MotionFilter unmoved = first_filter;
     register_frame(frame, kBootstrapIterations, 1.0);
-    is_trustworthy();
-    const bool same_view = static_cast<double>(near) >= kSameViewShare * static_cast<double>(candidates);
-    first_filter = same_view ? unmoved : likeliest_start(frame, unmoved);
+    first_filter = sees_the_same(frame.prepared.points) ? unmoved : likeliest_start(frame, unmoved);
     begin_again(frame);
     settle(frame, kBootstrapPasses, kBootstrapIterations);
     register_frame(frame, kBootstrapIterations, 1.0);
+}
+
+/// The first scan is seen again, by its surfaces of every direction: in a street, facades and ground look the same
+/// from everywhere, and only the little that faces along it tells a motion.
+bool Odometry::State::sees_the_same(const PointSelection& points) const {
+    std::array<double, kViewDirections> seen{};
+    std::array<double, kViewDirections> again{};
+    const auto count = [](std::array<double, kViewDirections>& counts, float nx, float ny) {
+        if (nx * nx + ny * ny < 0.5F) return;
+        // Both sides of a surface are one direction. The axes lie in the middle of theirs.
+        const double half_turns = std::atan2(static_cast<double>(ny), static_cast<double>(nx)) / std::numbers::pi + 2.0;
+        ++counts[static_cast<std::size_t>(half_turns * kViewDirections + 0.5) % kViewDirections];
+    };
+    for (std::size_t i = 0; i < excluded.size(); ++i) {
+        if (points.planarity[i] > 0.0F && !excluded[i]) count(seen, placed.nx[i], placed.ny[i]);
+    }
+    for (std::size_t i = 0; i < matches.count; ++i) {
+        if (std::abs(matches.residual[i]) < kNear_m) count(again, matches.h[0][i], matches.h[1][i]);
+    }
+    for (std::size_t k = 0; k < kViewDirections; ++k) {
+        if (seen[k] >= kMinViewPoints && again[k] < kSameViewShare * seen[k]) return false;
+    }
+    return true;
 }
 
 /// The robot may be fast already: beyond a metre or so between two scans, the registration finds the nearest of what

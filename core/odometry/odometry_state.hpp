@@ -45,6 +45,7 @@ struct Odometry::State {
     void settle(const Frame& frame, int passes, int iterations_a_pass);
     void begin_again(const Frame& frame);
     double predicted_deviation_m() const;
+    bool sees_the_same(const PointSelection& points) const;
     double fit() const;
     bool first_scan_is_void() const;
     void place_provisional();
