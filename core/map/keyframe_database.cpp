@@ -36,10 +36,13 @@ KeyframeDatabase::KeyframeDatabase(const KeyframeConfig& config, const VoxelMapC
     order_.reserve(most);
 }
 
+double KeyframeDatabase::spacing_m(double spaciousness_m) const {
+    return std::clamp(config_.distance_share * spaciousness_m, config_.min_distance_m, config_.max_distance_m);
+}
+
 bool KeyframeDatabase::is_due(const Eigen::Isometry3d& T, double spaciousness_m) const {
     if (keyframes_.size() + announced_.size() < kFirstKeyframes) return true;
-    const double distance =
-        std::clamp(config_.distance_share * spaciousness_m, config_.min_distance_m, config_.max_distance_m);
+    const double distance = spacing_m(spaciousness_m);
     const double angle = config_.angle_deg * std::numbers::pi / 180.0;
     const Eigen::Quaterniond rotation(T.rotation());
     const auto covers = [&](const Eigen::Vector3d& position, const Eigen::Quaterniond& other) {
@@ -70,6 +73,12 @@ Matrix6d KeyframeDatabase::anchor_covariance(const Eigen::Vector3d& position_m) 
         sum += J * keyframe.covariance * J.transpose();
     }
     return count > 0 ? Matrix6d(sum / static_cast<double>(count)) : sum;
+}
+
+double KeyframeDatabase::newness(const Eigen::Vector3d& position_m, double spaciousness_m) const {
+    if (order_.empty()) return 0.0;
+    const double way_m = (keyframes_[order_.front().second].position_m - position_m).norm();
+    return std::min(1.0, way_m / spacing_m(spaciousness_m));
 }
 
 void KeyframeDatabase::convert(const KeyframeCloud& cloud, std::vector<FixedPoint>& points) {

@@ -60,6 +60,9 @@ class KeyframeDatabase {
     void announce(const Eigen::Isometry3d& T_world_sensor, const Matrix6d& covariance);
     /// How uncertain the submap itself is, as a pose at this position: mean of the nearest keyframes.
     Matrix6d anchor_covariance(const Eigen::Vector3d& position_m) const;
+    /// How much of what is seen from this position is seen anew: the way to the nearest keyframe, as a share of the
+    /// distance at which there would be another one, at most 1.
+    double newness(const Eigen::Vector3d& position_m, double spaciousness_m) const;
     void add(const KeyframeCloud& cloud);
     /// A stand-in for the submap while there is no keyframe yet.
     void set_provisional(const KeyframeCloud& cloud);
@@ -91,6 +94,7 @@ class KeyframeDatabase {
         bool in_submap = false;
     };
 
+    double spacing_m(double spaciousness_m) const;
     static void convert(const KeyframeCloud& cloud, std::vector<FixedPoint>& points);
     void sort_by_place(std::vector<FixedPoint>& points);
     static void find_bounds(Keyframe& keyframe);

@@ -234,6 +234,7 @@ const VoxelPlane* VoxelMap::find_facet(VoxelIndex index, const float normal[3]) 
 
 void VoxelMap::fit_facet(std::uint32_t slot) {
     fit(facets_[slot], facet_planes_[slot]);
+    facet_planes_[slot].surface = 2 * slot;
 }
 
 /// All facets together; one alone is the voxel.
@@ -254,6 +255,7 @@ void VoxelMap::fit_voxel(std::uint32_t slot) {
         for (std::size_t k = 0; k < 6; ++k) all.square[k] += m.square[k];
     }
     fit(all, voxel_planes_[slot]);
+    voxel_planes_[slot].surface = 2 * slot + 1;
 }
 
 void VoxelMap::fit(const Moments& m, VoxelPlane& plane) const {

@@ -69,6 +69,7 @@ struct alignas(64) VoxelPlane {
     bool flat;            ///< false: too few points or too thick, the normal means nothing
     bool fitted = false;  ///< the map's own: false where the moments have changed since
     std::uint32_t points;
+    std::uint32_t surface;  ///< number of this plane, another one than those of all others in the map
 };
 
 class VoxelMap {

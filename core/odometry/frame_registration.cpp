@@ -1,4 +1,5 @@
 // Registration of a frame in two stages, with the motion over its sweep.
+#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -39,9 +40,14 @@ constexpr double kSkewReach_m = 10.0;
 // Gates open as the prediction's standard deviation grows beyond this.
 constexpr double kSureDeviation_m = 0.1;
 constexpr double kMaxWidening = 3.0;
+// Level and biases, which a start under acceleration gets wrong, are known after so long: before, a prediction by the
+// IMU is no judge.
+constexpr double kSettling_s = 3.0;
+constexpr double kLagSmoothing = 0.1;
+constexpr double kClockOffset_s = 1e-3;
 
-bool converged(const MotionFilter::Step& step) {
-    return step.translation_m < kStopTranslation_m && step.rotation_rad < kStopRotation_rad;
+bool converged(const Vector6d& step) {
+    return step.head<3>().norm() < kStopTranslation_m && step.tail<3>().norm() < kStopRotation_rad;
 }
 
 }  // namespace
@@ -67,6 +73,7 @@ bool Odometry::State::estimate(const Frame& frame) {
         if (bootstrapping && first_scan_is_void()) void_scan_ns = first_filter.stamp_ns();
         filter.finish_update();
         held.end_frame();
+        see_uncertainty();
         if (filter.uses_imu() && monitor.quiet()) {
             const Observability::Directions u = held.observability().directions();
             for (Eigen::Index k = 0; k < u.cols(); ++k) filter.observe_rest(u.col(k).head<3>());
@@ -75,6 +82,38 @@ bool Odometry::State::estimate(const Frame& frame) {
     }
     filter.discard_update();
     return false;
+}
+
+/// What the matches leave uncertain, where nothing is held: their own errors, and those of the map.
+void Odometry::State::see_uncertainty() {
+    constexpr double kNothing = 1e-3;  // makes what is held invertible
+    const Observability::Directions u = held.observability().directions();
+    const Matrix6d free = Matrix6d::Identity() - u * u.transpose();
+    const auto covariance = [&](const Matrix6d& information) {
+        const Matrix6d both = free * information * free + u * u.transpose() + kNothing * Matrix6d::Identity();
+        return Matrix6d(free * both.ldlt().solve(Matrix6d::Identity()) * free);
+    };
+    from_scan = covariance(equations.A[0]);
+    from_map = covariance(surface_information.of(matches, config.surface_error_m));
+    if (filter.uses_imu()) {
+        lag.setZero();
+    } else {
+        // Without IMU the filter follows the scans no faster than a robot is taken to change its motion.
+        const Vector6d left = from_scan * (equations.b[0] + equations.A[0] * last_step);
+        const Matrix6d now = left * left.transpose();
+        lag += kLagSmoothing * (now - lag);
+        from_scan += now + lag + free * filter.sweep_noise(static_cast<double>(motion.duration_s)) * free;
+    }
+}
+
+/// How far the pose may be from the prediction. At speed, and the more in fast turns, an offset between the clocks of
+/// IMU and lidar counts, too.
+Matrix6d Odometry::State::prediction_covariance() const {
+    Vector6d motion_of_sensor;
+    motion_of_sensor << filter.state().velocity_mps,
+        filter.T_world_sensor().rotation() * filter.sensor_angular_velocity();
+    return filter.covariance().topLeftCorner<6, 6>() +
+           kClockOffset_s * kClockOffset_s * motion_of_sensor * motion_of_sensor.transpose();
 }
 
 /// Enough points have found the submap, and most of those lie on it. Counts the latter.
@@ -219,6 +258,7 @@ void Odometry::State::place_provisional() {
 void Odometry::State::register_frame(const Frame& frame, int first_stage_iterations, double widening) {
     const PointSelection& points = frame.prepared.points;
     const double predicted_m = predicted_deviation_m();
+    const double since_start_s = static_cast<double>(frame.header.stamp_ns - start_ns) * 1e-9;
     filter.begin_update();
     matches.clear();
     held.begin_frame();
@@ -227,11 +267,18 @@ void Odometry::State::register_frame(const Frame& frame, int first_stage_iterati
             if (i > 0) update_sweep(frame);
             match(i);
             if (matches.count < kMinMatches) return;
-            if (i > 0) held.observability().leave_facing(matches);
-            accumulate(matches, equations);
-            if (i == 0) held.judge(matches, equations, filter.uses_imu());
+            if (i == 0) {
+                accumulate(matches, equations);
+                held.judge(matches, equations, filter.uses_imu());
+            }
+            const Observability& seen = held.observability();
+            if (i > 0) seen.leave_facing(matches);
+            const bool asks = filter.uses_imu() && since_start_s > kSettling_s && seen.any_weak();
+            if (asks) seen.ask_prediction(matches, filter.correction().head<6>(), prediction_covariance());
+            if (i > 0 || asks) accumulate(matches, equations);
             ++iterations;
-            if (converged(filter.step(equations, held.observability().directions()))) return;
+            last_step = filter.step(equations, held.observability().directions());
+            if (converged(last_step)) return;
         }
     };
     if (scan_to_scan.has_target()) {

@@ -18,6 +18,8 @@ constexpr int kGravity = 15;
 constexpr double kPredictionStep_s = 2.5e-3;
 constexpr double kCovarianceStep_s = 0.1;
 constexpr double kUnknownVelocity_mps = 3.0;  // standard deviation at the start
+// Without IMU: time over which the robot's accelerations are averaged.
+constexpr double kMotionMemory_s = 1.0;
 // Variance of a block that the present mode does not know: so small that it stays what it is.
 constexpr double kFrozen = 1e-12;
 // A body at rest: how well its velocity is zero, and beyond how many standard deviations it is not believed to be.
@@ -179,7 +181,7 @@ void MotionFilter::begin_update() {
     information_ = prior_information_;
 }
 
-MotionFilter::Step MotionFilter::step(const NormalEquations& equations, const Observability::Directions& held) {
+Vector6d MotionFilter::step(const NormalEquations& equations, const Observability::Directions& held) {
     // The points' h is about (position, rotation) at their own time; dt turns it into (velocity, rate) at the stamp.
     const double share = imu_ != nullptr ? config_.information_share : config_.information_share_without_imu;
     Matrix6d G = Matrix6d::Identity();
@@ -206,10 +208,11 @@ MotionFilter::Step MotionFilter::step(const NormalEquations& equations, const Ob
     }
     error += information_.ldlt().solve(-gradient);
     apply(state_, error);
-    return {error.segment<3>(kPosition).norm(), error.segment<3>(kRotation).norm()};
+    return error.head<6>();
 }
 
 void MotionFilter::finish_update() {
+    see_motion();
     const Matrix prior = covariance_;
     covariance_ = information_.ldlt().solve(Matrix::Identity());
     if (held_.cols() > 0) {
@@ -220,6 +223,31 @@ void MotionFilter::finish_update() {
         covariance_ += effect * (held_.transpose() * prior * held_) * effect.transpose();
     }
     covariance_ = 0.5 * (covariance_ + covariance_.transpose()).eval();
+}
+
+/// The robot's accelerations are as large as the scans show the prediction to be wrong: by a variance of q dt^3 / 3.
+void MotionFilter::see_motion() {
+    const double dt = static_cast<double>(stamp_ns_ - updated_ns_) * 1e-9;
+    updated_ns_ = stamp_ns_;
+    if (imu_ != nullptr || held_.cols() > 0 || dt <= 0.0 || dt > kMotionMemory_s) return;
+    const Vector change = correction();
+    const auto follow = [&](double& density2, int block) {
+        const double seen = change.segment<3>(block).squaredNorm() / (dt * dt * dt);
+        density2 += dt / kMotionMemory_s * (seen - density2);
+    };
+    follow(acceleration2_, kPosition);
+    follow(angular_acceleration2_, kRotation);
+}
+
+/// A straight line fitted to an integrated random walk of density q over a time T misses its end by a variance of
+/// q T^3 / 105.
+Matrix6d MotionFilter::sweep_noise(double duration_s) const {
+    Matrix6d noise = Matrix6d::Zero();
+    if (imu_ != nullptr) return noise;
+    const double share = duration_s * duration_s * duration_s / 105.0;
+    noise.diagonal().head<3>().setConstant(acceleration2_ * share);
+    noise.diagonal().tail<3>().setConstant(angular_acceleration2_ * share);
+    return noise;
 }
 
 void MotionFilter::observe_rest(const Eigen::Vector3d& direction) {

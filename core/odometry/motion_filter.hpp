@@ -83,13 +83,10 @@ class MotionFilter {
 
     /// The update: begin, then any number of steps each linearised at the present state, then finish.
     void begin_update();
-    struct Step {
-        double translation_m = 0.0;
-        double rotation_rad = 0.0;
-    };
     /// @param held directions of (translation, rotation), world axes, along which the lidar says nothing: pose and
     /// velocity stay as predicted there, and so does their uncertainty
-    Step step(const NormalEquations& equations, const Observability::Directions& held);
+    /// @return how far the pose has been moved: translation, rotation
+    Vector6d step(const NormalEquations& equations, const Observability::Directions& held);
     void finish_update();
     /// After an update: the velocity along this direction, world axes, is believed to be zero, as far as it can be.
     void observe_rest(const Eigen::Vector3d& direction);
@@ -110,12 +107,16 @@ class MotionFilter {
     Eigen::Vector3d sensor_angular_velocity() const;  ///< sensor frame
     /// Of the sensor's translation, then rotation, world axes.
     Matrix6d pose_covariance() const;
+    /// Covariance of (translation, rotation), world axes, that comes of the motion within a sweep of this duration not
+    /// being quite what the state says.
+    Matrix6d sweep_noise(double duration_s) const;
     const Matrix& covariance() const { return covariance_; }
     std::int64_t stamp_ns() const { return stamp_ns_; }
 
   private:
     void advance(MotionState& s, std::int64_t mid_ns, double dt) const;
     Eigen::Vector3d body_rate(const MotionState& s, std::int64_t time_ns) const;
+    void see_motion();
     void grow_covariance(const MotionState& before, const Eigen::Vector3d& acceleration_world, double dt);
     static Vector difference(const MotionState& a, const MotionState& b);
     static void apply(MotionState& s, const Vector& error);
@@ -130,6 +131,10 @@ class MotionFilter {
     Matrix prior_information_ = Matrix::Identity();
     Matrix information_ = Matrix::Identity();
     Eigen::Matrix<double, kStates, Eigen::Dynamic, 0, kStates, 12> held_;  ///< of the last step: basis of what is held
+    /// Without IMU: squared densities of the robot's acceleration and angular acceleration, as seen of late.
+    double acceleration2_ = 0.0;
+    double angular_acceleration2_ = 0.0;
+    std::int64_t updated_ns_ = 0;
     std::int64_t stamp_ns_ = 0;
 };
 

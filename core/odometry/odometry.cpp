@@ -15,6 +15,15 @@ constexpr double kLost_s = 2.0;
 // Without a scan for longer than this there is no prediction worth the name.
 constexpr double kMaxGap_s = 5.0;
 constexpr double kStandardGravity_mps2 = 9.80665;
+// Where the robot may be after that: standard deviations.
+constexpr double kAway_m = 15.0;
+constexpr double kAway_rad = 1.0;
+
+Matrix6d away() {
+    Vector6d deviation;
+    deviation << Eigen::Vector3d::Constant(kAway_m), Eigen::Vector3d::Constant(kAway_rad);
+    return deviation.cwiseAbs2().asDiagonal();
+}
 
 }  // namespace
 
@@ -49,6 +58,7 @@ void Odometry::State::process(Frame& frame, const OdometryFeedback* feedback) {
     flags = 0;
     iterations = 0;
     registered = false;
+    just_started = false;
     trusted = true;
     void_scan_ns.reset();
     const double step_s = static_cast<double>(frame.header.stamp_ns - filter.stamp_ns()) * 1e-9;
@@ -59,7 +69,7 @@ void Odometry::State::process(Frame& frame, const OdometryFeedback* feedback) {
         // The sensor was away, or its clock has jumped: whatever a prediction over such a time gave would be invented.
         imu.clear();
         imu.add(frame.imu);
-        restart(frame);
+        restart(frame, away());
         trusted = false;
     } else {
         choose_motion_model(frame);
@@ -72,7 +82,7 @@ void Odometry::State::process(Frame& frame, const OdometryFeedback* feedback) {
         // Two first scans that do not fit each other: one of them is no good, and which will be seen.
         const bool bad_start = bootstrapping && flat_points(frame) >= kMinFirstPoints;
         if (!registered && frame.header.usable && (lost || bad_start)) {
-            restart(frame);
+            restart(frame, Matrix6d::Zero());
             trusted = false;
         } else {
             bootstrapping = bootstrapping && !registered;
@@ -183,6 +193,9 @@ void Odometry::State::start(const Frame& frame, const Eigen::Isometry3d& T_world
     map_sequence = frame.header.sequence;
     bootstrapping = true;
     registered = true;
+    just_started = true;
+    start_ns = frame.header.stamp_ns;
+    start_position_m = T.translation();
     choose_origin();
     update_sweep(frame);
     first_filter = filter;
@@ -194,11 +207,12 @@ void Odometry::State::start(const Frame& frame, const Eigen::Isometry3d& T_world
 }
 
 /// Goes on with a new map from where the robot is believed to be: it is lost, or the sensor's clock has jumped back.
-void Odometry::State::restart(const Frame& frame) {
+/// @param moved covariance of what the robot may have moved since the prediction
+void Odometry::State::restart(const Frame& frame, const Matrix6d& moved) {
     flags |= OdometryResult::kReinitialized;
     keyframes.clear();
     held.reset();
-    anchor.setZero();
+    start_covariance = anchor + filter.pose_covariance() + moved;
     start(frame, filter.T_world_sensor());
 }
 

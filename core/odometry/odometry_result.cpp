@@ -23,8 +23,8 @@ void Odometry::State::write_result(Frame& frame) {
     out.linear_velocity_mps = filter.sensor_linear_velocity();
     out.angular_velocity_radps = filter.sensor_angular_velocity();
     const Matrix6d deviation = filter.pose_covariance();
-    if (registered) update_anchor(out.T_world_sensor.translation());
-    out.covariance = deviation + anchor;
+    const double range_m = median_range(frame.prepared.points);
+    out.covariance = covariance_in_world(out.T_world_sensor.translation(), range_m, deviation);
     out.gravity_mps2 = filter.state().gravity_mps2;
     out.iterations = iterations;
     out.correspondences = static_cast<int>(registered ? matches.count : 0);
@@ -42,8 +42,7 @@ void Odometry::State::write_result(Frame& frame) {
     out.residual_cap_m = static_cast<float>(config.scan_to_submap.residual_cap_m);
     // A first scan has been deskewed without its velocity: it is no keyframe.
     out.void_scan_ns = void_scan_ns;
-    out.keyframe =
-        registered && !bootstrapping && keyframes.is_due(out.T_world_sensor, median_range(frame.prepared.points));
+    out.keyframe = registered && !bootstrapping && keyframes.is_due(out.T_world_sensor, range_m);
     if (!out.keyframe) return;
     keyframes.announce(out.T_world_sensor, out.covariance);
     write_keyframe_points(frame);
@@ -68,13 +67,32 @@ void Odometry::State::write_keyframe_points(Frame& frame) const {
     }
 }
 
+/// Covariance of the pose in the world: of the submap, of the registration with it, and of what is held or predicted.
+/// The filter's own uncertainty serves for the latter only: it is made for a steady pose, not for an honest one.
+Matrix6d Odometry::State::covariance_in_world(const Eigen::Vector3d& position_m, double range_m,
+                                              const Matrix6d& deviation) {
+    if (registered) update_anchor(position_m);
+    if (!registered || just_started) return anchor + deviation;
+    const Observability::Directions u = held.observability().directions();
+    const Matrix6d along = u * u.transpose();
+    return anchor + from_scan + keyframes.newness(position_m, range_m) * from_map + along * deviation * along;
+}
+
 /// How uncertain the submap is that the pose rests on. Along what is held that is still the one that was left behind:
 /// what has happened since then is in the filter's own uncertainty.
 void Odometry::State::update_anchor(const Eigen::Vector3d& position_m) {
     const Observability::Directions u = held.observability().directions();
     const Matrix6d along = u * u.transpose();
     const Matrix6d free = Matrix6d::Identity() - along;
-    anchor = (along * anchor * along + free * keyframes.anchor_covariance(position_m) * free).eval();
+    Matrix6d submap;
+    if (keyframes.size() > 0) {
+        submap = keyframes.anchor_covariance(position_m);
+    } else {
+        Matrix6d J = Matrix6d::Identity();
+        J.block<3, 3>(0, 3) = -skew(position_m - start_position_m);
+        submap = J * start_covariance * J.transpose();
+    }
+    anchor = (along * anchor * along + free * submap * free).eval();
 }
 
 /// Nothing of whichever frame was here before remains: all runs give the same.

@@ -31,7 +31,7 @@ struct Odometry::State {
 
     void apply(const OdometryFeedback& feedback);
     void start(const Frame& frame, const Eigen::Isometry3d& T_world_sensor);
-    void restart(const Frame& frame);
+    void restart(const Frame& frame, const Matrix6d& moved);
     static std::size_t taking_part(const PointSelection& points);
     static std::size_t flat_points(const Frame& frame);
     bool estimate(const Frame& frame);
@@ -50,12 +50,15 @@ struct Odometry::State {
     bool first_scan_is_void() const;
     void place_provisional();
     bool is_trustworthy();
+    void see_uncertainty();
+    Matrix6d prediction_covariance() const;
     void choose_origin();
     void update_sweep(const Frame& frame);
     void place_target(const PointSelection& points, std::span<const std::uint8_t> without,
                       const Eigen::Isometry3d& T_world_sensor);
     void see_turn(std::int64_t stamp_ns);
     void update_anchor(const Eigen::Vector3d& position_m);
+    Matrix6d covariance_in_world(const Eigen::Vector3d& position_m, double range_m, const Matrix6d& deviation);
     void write_result(Frame& frame);
     void write_keyframe_points(Frame& frame) const;
     void write_nothing(Frame& frame) const;
@@ -81,15 +84,22 @@ struct Odometry::State {
     MotionState first_motion;        ///< while bootstrapping: that it was published with
     HeldDirections held;
     std::int64_t last_registered_ns = 0;
-    Matrix6d anchor = Matrix6d::Zero();                                ///< covariance of what the pose is relative to
-    Eigen::Isometry3d T_world_target = Eigen::Isometry3d::Identity();  ///< pose of the first stage's target scan
-    std::int64_t target_ns = 0;                                        ///< its stamp
+    Matrix6d from_scan = Matrix6d::Zero();  ///< covariance of the last registration, the map being right
+    Matrix6d lag = Matrix6d::Zero();        ///< mean square of what the filter has not followed of late, without IMU
+    Matrix6d from_map = Matrix6d::Zero();   ///< what the map's errors add where it is seen from elsewhere
+    Matrix6d anchor = Matrix6d::Zero();     ///< covariance of what the pose is relative to
+    Matrix6d start_covariance = Matrix6d::Zero();                         ///< of the pose that the map began with
+    std::int64_t start_ns = 0;                                            ///< stamp of that pose
+    Eigen::Vector3d start_position_m = Eigen::Vector3d::Zero();           ///< of that pose
+    Eigen::Isometry3d T_world_target = Eigen::Isometry3d::Identity();     ///< pose of the first stage's target scan
+    std::int64_t target_ns = 0;                                           ///< its stamp
     Eigen::Quaterniond target_rotation = Eigen::Quaterniond::Identity();  ///< of the body
     Eigen::Vector3d lidar_rate_radps = Eigen::Vector3d::Zero();  ///< body, between the last two registered scans
 
     // Of the present frame.
     std::uint32_t flags = 0;
     bool registered = false;
+    bool just_started = false;                 ///< the map began with this frame
     bool trusted = true;                       ///< false: what this frame gives is not to be used
     std::optional<std::int64_t> void_scan_ns;  ///< as in the result
     SweepMotion motion;
@@ -101,10 +111,12 @@ struct Odometry::State {
     double usual_near = 0.0;     ///< the same over the last frames
     PlaneMatches matches;
     NormalEquations equations;
+    SurfaceInformation surface_information;
     AlignedVector<std::uint8_t> excluded;
     std::vector<float> ranges;
     double spaciousness_m = 0.0;
     int iterations = 0;
+    Vector6d last_step = Vector6d::Zero();  ///< of the filter: translation, rotation
 };
 
 }  // namespace dlod

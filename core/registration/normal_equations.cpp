@@ -60,9 +60,11 @@ void PlaneMatches::reserve(std::size_t n) {
     weight.resize(length);
     time_s.resize(length);
     lever_m.resize(length);
+    surface.resize(length);
 }
 
-void PlaneMatches::push(const float n[3], const float l[3], float distance, float inverse_variance, float time) {
+void PlaneMatches::push(const float n[3], const float l[3], float distance, float inverse_variance, float time,
+                        std::uint32_t of_surface) {
     h[0][count] = n[0];
     h[1][count] = n[1];
     h[2][count] = n[2];
@@ -73,6 +75,7 @@ void PlaneMatches::push(const float n[3], const float l[3], float distance, floa
     weight[count] = inverse_variance;
     time_s[count] = time;
     lever_m[count] = std::sqrt(l[0] * l[0] + l[1] * l[1] + l[2] * l[2]);
+    surface[count] = of_surface;
     ++count;
 }
 
@@ -102,6 +105,29 @@ void accumulate(PlaneMatches& matches, NormalEquations& equations) {
     }
     equations.weighted_squares = total(kSums - 1);
     equations.count = matches.count;
+}
+
+Matrix6d SurfaceInformation::of(const PlaneMatches& matches, double error_m) {
+    for (std::size_t i = 0; i < matches.count; ++i) {
+        if (matches.surface[i] >= weight_.size()) weight_.resize(2 * std::size_t{matches.surface[i]} + 1, 0.0F);
+        weight_[matches.surface[i]] += matches.weight[i];
+    }
+    const auto error2 = static_cast<float>(error_m * error_m);
+    float sums[kPairs] = {};
+    for (std::size_t i = 0; i < matches.count; ++i) {
+        const float weight = matches.weight[i] / (1.0F + error2 * weight_[matches.surface[i]]);
+        float h[6];
+        for (std::size_t a = 0; a < 6; ++a) h[a] = matches.h[a][i];
+        for (int a = 0, k = 0; a < 6; ++a) {
+            for (int b = a; b < 6; ++b) sums[k++] += weight * h[a] * h[b];
+        }
+    }
+    for (std::size_t i = 0; i < matches.count; ++i) weight_[matches.surface[i]] = 0.0F;
+    Matrix6d information;
+    for (int a = 0, k = 0; a < 6; ++a) {
+        for (int b = a; b < 6; ++b) information(a, b) = information(b, a) = static_cast<double>(sums[k++]);
+    }
+    return information;
 }
 
 }  // namespace dlod

@@ -16,6 +16,10 @@ constexpr float kFacingLever = 0.1F;
 // As many facing matches make a direction observable. In a bare tunnel there is none; how much they say is weighed
 // against the prediction by their information.
 constexpr double kFacingMatches = 5.0;
+// A match so many standard deviations from what the prediction says has a quarter of its weight.
+constexpr float kSurprise = 2.0F;
+// With less than this share of those matches' weight left the prediction is not believed.
+constexpr float kLeastAgreement = 0.25F;
 
 /// The part of a match along a direction.
 float part_along(const PlaneMatches& matches, std::size_t i, int block, const Eigen::Vector3f& u) {
@@ -63,6 +67,37 @@ void Observability::leave_facing(PlaneMatches& matches) const {
             for (std::size_t j = 0; j < 3; ++j) matches.h[b + j][i] -= along * u[static_cast<Eigen::Index>(j)];
         }
     }
+}
+
+void Observability::ask_prediction(PlaneMatches& matches, const Vector6d& change, const Matrix6d& covariance) const {
+    const Eigen::Matrix<float, 6, 1> moved = change.cast<float>();
+    const Eigen::Matrix<float, 6, 6> prior = covariance.cast<float>();
+    /// By how much a match weighs less; 1 for those that nobody asks about.
+    const auto fall = [&](std::size_t i) {
+        bool asked = false;
+        for (int k = 0; k < weak_count_; ++k) {
+            const auto& [u, block] = weak_[static_cast<std::size_t>(k)];
+            asked = asked || (block == 0 && faces(matches, i, block, part_along(matches, i, block, u)));
+        }
+        if (!asked || matches.weight[i] <= 0.0F) return 1.0F;
+        Eigen::Matrix<float, 6, 1> h;
+        for (std::size_t j = 0; j < 6; ++j) h[static_cast<Eigen::Index>(j)] = matches.h[j][i];
+        const float surprise = matches.residual[i] - h.dot(moved);
+        const float variance = h.dot(prior * h) + 1.0F / matches.weight[i];
+        const float root = 1.0F / (1.0F + surprise * surprise / (kSurprise * kSurprise * variance));
+        return root * root;
+    };
+    // Where next to nothing agrees with the prediction, it is the prediction that is wrong.
+    float all = 0.0F;
+    float agreeing = 0.0F;
+    for (std::size_t i = 0; i < matches.count; ++i) {
+        if (const float f = fall(i); f < 1.0F) {
+            all += matches.weight[i];
+            agreeing += f * matches.weight[i];
+        }
+    }
+    if (agreeing < kLeastAgreement * all) return;
+    for (std::size_t i = 0; i < matches.count; ++i) matches.weight[i] *= fall(i);
 }
 
 }  // namespace dlod

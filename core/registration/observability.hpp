@@ -25,6 +25,13 @@ class Observability {
     /// Along directions that only few matches face, the noise of all the others' normals outweighs what those few say:
     /// takes it out.
     void leave_facing(PlaneMatches& matches) const;
+    /// There are such directions.
+    bool any_weak() const { return weak_count_ > 0; }
+    /// Of those few most may lie on one thing that moves, a door that opens. There the prediction is asked, too: those
+    /// that it would not have expected weigh less.
+    /// @param change of the pose from the prediction to where the matches' residuals have been taken
+    /// @param covariance of the prediction
+    void ask_prediction(PlaneMatches& matches, const Vector6d& change, const Matrix6d& covariance) const;
 
   private:
     struct Weak {

@@ -69,7 +69,8 @@ void ScanToScan::match(const PointSelection& points, std::span<const std::uint8_
     for (std::size_t i = 0; i < excluded.size(); i += step) {
         if (points.planarity[i] <= 0.0F || excluded[i]) continue;
         const Eigen::Vector3f p = T_target_local * Eigen::Vector3f(placed.x[i], placed.y[i], placed.z[i]);
-        const Surfel& surfel = grid_[static_cast<std::size_t>(cell_of(p.data()))];
+        const int cell = cell_of(p.data());
+        const Surfel& surfel = grid_[static_cast<std::size_t>(cell)];
         if (!surfel.set) continue;
         const Eigen::Vector3f d = p - Eigen::Map<const Eigen::Vector3f>(surfel.position);
         const Eigen::Vector3f n = R_local_target * Eigen::Map<const Eigen::Vector3f>(surfel.normal);
@@ -78,7 +79,8 @@ void ScanToScan::match(const PointSelection& points, std::span<const std::uint8_
         if (n.dot(Eigen::Vector3f(placed.nx[i], placed.ny[i], placed.nz[i])) < min_cosine) continue;
         const float fall = 1.0F / (1.0F + residual * residual / (kernel * kernel));
         const float lever[3] = {placed.lx[i], placed.ly[i], placed.lz[i]};
-        matches.push(n.data(), lever, residual, points.planarity[i] * fall * fall / kNoiseVariance, points.time_s[i]);
+        matches.push(n.data(), lever, residual, points.planarity[i] * fall * fall / kNoiseVariance, points.time_s[i],
+                     static_cast<std::uint32_t>(cell));
     }
 }
 

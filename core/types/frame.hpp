@@ -88,7 +88,10 @@ struct OdometryResult {
         kImuFaulty = 1U << 4,       ///< the IMU is there but absurd and is not used
         kStarted = 1U << 5,         ///< the world frame begins anew: first frame of a run, or after a restart
     };
-    bool valid = false;             ///< false: not to be used, not written, published with its flag
+    /// Registered with the local map, or predicted, to within OdometryConfig::max_deviation_m in every direction: fit for
+    /// planning around what is seen now. False: not to be used, not written, published with its flag. It says nothing
+    /// of the way from the world's origin: that is what the covariance is for.
+    bool valid = false;
     std::uint32_t flags = 0;
     /// Good enough for seeing what moves: valid, or else registered with the local map but adrift along a direction in
     /// which nothing is to be seen.
@@ -98,7 +101,9 @@ struct OdometryResult {
     Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();  ///< at the frame's stamp
     Eigen::Vector3d linear_velocity_mps = Eigen::Vector3d::Zero();     ///< sensor frame
     Eigen::Vector3d angular_velocity_radps = Eigen::Vector3d::Zero();  ///< sensor frame
-    Matrix6d covariance = Matrix6d::Zero();  ///< of translation (world), then rotation (world, small angles)
+    /// Of translation (world), then rotation (world, small angles), against the world frame as the first pose has fixed
+    /// it: grows with the way. How well that frame is levelled is not in it.
+    Matrix6d covariance = Matrix6d::Zero();
     Eigen::Vector3d gravity_mps2 = Eigen::Vector3d(0.0, 0.0, -9.80665);  ///< world frame, as estimated
     int iterations = 0;
     int correspondences = 0;

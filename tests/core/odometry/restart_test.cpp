@@ -41,6 +41,18 @@ TEST_P(Restart, TheNewMapIsNotMixedWithKeyframesOfTheOld) {
     }
 }
 
+TEST_P(Restart, NothingIsKnownOfTheWayMeanwhile) {
+    SimulatedDrive drive(furnished_room(), loop);
+    OdometryRun run(drive, config());
+    run.run(0, 13);
+    const auto deviation = [&] { return std::sqrt(run.frames.back().covariance.topLeftCorner<3, 3>().trace()); };
+    EXPECT_LT(deviation(), 0.05);
+    run.run(75, 95);
+    // It is as good as ever within the new map, but where that is in the world is lost.
+    EXPECT_TRUE(run.frames.back().valid);
+    EXPECT_GT(deviation(), 10.0);
+}
+
 INSTANTIATE_TEST_SUITE_P(Odometry, Restart, testing::Bool());
 
 }  // namespace

@@ -65,13 +65,17 @@ Consistency measure(bool imu) {
 
 class Uncertainty : public testing::TestWithParam<bool> {};
 
-TEST_P(Uncertainty, CoversTheErrorsWithoutBeingVague) {
+TEST_P(Uncertainty, IsAsLargeAsTheErrors) {
     const Consistency c = measure(GetParam());
-    // On the safe side, as errors of the map are shared by all points of a surface, but not vague.
-    EXPECT_GT(c.position, 0.01);
-    EXPECT_LT(c.position, 1.0);
-    EXPECT_GT(c.rotation, 0.01);
-    EXPECT_LT(c.rotation, 1.0);
+    RecordProperty("position", std::to_string(c.position));
+    RecordProperty("rotation", std::to_string(c.rotation));
+    // 1 where it is honest. Errors of neighbouring frames are alike: the mean over so few seeds scatters.
+    // Without IMU the walk's first steps come before its restlessness is known.
+    const double most = GetParam() ? 2.0 : 4.0;
+    EXPECT_GT(c.position, 0.25);
+    EXPECT_LT(c.position, most);
+    EXPECT_GT(c.rotation, 0.25);
+    EXPECT_LT(c.rotation, most);
 }
 
 INSTANTIATE_TEST_SUITE_P(Odometry, Uncertainty, testing::Bool());

@@ -39,7 +39,7 @@ std::vector<Match> random_matches(std::size_t count, std::uint64_t seed) {
 void fill(const std::vector<Match>& from, PlaneMatches& to) {
     to.reserve(from.size());
     to.clear();
-    for (const Match& m : from) to.push(m.normal.data(), m.lever.data(), m.distance, m.weight, m.time_s);
+    for (const Match& m : from) to.push(m.normal.data(), m.lever.data(), m.distance, m.weight, m.time_s, 0);
 }
 
 class Counts : public testing::TestWithParam<std::size_t> {};
@@ -131,6 +131,32 @@ TEST(NormalEquations, GradientAndCurvatureAreThoseOfTheSumOfSquares) {
         numeric += static_cast<double>(m.weight) * row * row.transpose();
     }
     EXPECT_LT((curvature - numeric).cwiseAbs().maxCoeff(), 1e-5 * numeric.cwiseAbs().maxCoeff());
+}
+
+/// Deviation of the height after so many points of weight 1e4 on each of some surfaces that face up.
+double height_deviation(int surfaces, int points_each, double error_m) {
+    const float up[3] = {0.0F, 0.0F, 1.0F};
+    PlaneMatches matches;
+    matches.reserve(static_cast<std::size_t>(surfaces * points_each));
+    for (int i = 0; i < surfaces * points_each; ++i) {
+        const float lever[3] = {static_cast<float>(i % 7) - 3.0F, static_cast<float>(i % 5) - 2.0F, -1.0F};
+        // Points of one surface do not follow each other.
+        matches.push(up, lever, 0.0F, 1e4F, 0.0F, static_cast<std::uint32_t>(1000 * (i % surfaces)));
+    }
+    SurfaceInformation information;
+    EXPECT_EQ(information.of(matches, error_m), information.of(matches, error_m));
+    return 1.0 / std::sqrt(information.of(matches, error_m)(2, 2));
+}
+
+TEST(SurfaceInformation, IsThatOfIndependentPointsWhereTheMapHasNoError) {
+    EXPECT_NEAR(height_deviation(10, 20, 0.0), 0.01 / std::sqrt(200.0), 1e-6);
+}
+
+TEST(SurfaceInformation, ManyPointsOfOneSurfaceTellNoMoreThanTheMapKnows) {
+    EXPECT_NEAR(height_deviation(1, 1000, 0.02), 0.02, 1e-4);
+    EXPECT_NEAR(height_deviation(16, 1000, 0.02), 0.02 / 4.0, 1e-4);
+    // A single point has its own error, too.
+    EXPECT_NEAR(height_deviation(1, 1, 0.02), std::sqrt(0.01 * 0.01 + 0.02 * 0.02), 1e-6);
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ PlaneMatches matches_of(int count, const std::function<Surface(double u, double 
         const Eigen::Vector3d off(gauss(random), gauss(random), gauss(random));
         const Eigen::Vector3f n = (s.normal + noise_rad * off).normalized().cast<float>();
         const Eigen::Vector3f p = s.point.cast<float>();
-        matches.push(n.data(), p.data(), 0.01F, 1e4F, -0.05F);
+        matches.push(n.data(), p.data(), 0.01F, 1e4F, -0.05F, static_cast<std::uint32_t>(i));
     }
     return matches;
 }
@@ -151,6 +151,31 @@ TEST(Observability, NoMatchesDetermineNothing) {
     EXPECT_EQ(o.unobservable(), 6);
     const Observability::Directions held = o.directions();
     EXPECT_LT((held.transpose() * held - Matrix6d::Identity()).norm(), 1e-9);
+}
+
+TEST(Observability, WhereFewSpeakThePredictionHasASay) {
+    auto matches = matches_of_passage_with_end_wall();
+    // Ten of the thirty lie on a door that has swung by 6 cm; the prediction was right to within 5 mm.
+    for (std::size_t i = 0; i < 30; ++i) matches.residual[i] = i < 10 ? 0.06F : 0.004F;
+    const Observability o = look(matches);
+    ASSERT_TRUE(o.any_weak());
+    const AlignedVector<float> before = matches.weight;
+    const Matrix6d prior = 0.005 * 0.005 * Matrix6d::Identity();
+    o.ask_prediction(matches, Vector6d::Zero(), prior);
+    for (std::size_t i = 0; i < 30; ++i) {
+        if (i < 10) {
+            EXPECT_LT(matches.weight[i], 0.1F * before[i]) << i;
+        } else {
+            EXPECT_GT(matches.weight[i], 0.8F * before[i]) << i;
+        }
+    }
+    // What counts is the distance from the prediction, wherever the solution is by now.
+    auto moved = matches_of_passage_with_end_wall();
+    for (std::size_t i = 0; i < 30; ++i) moved.residual[i] = 0.004F + 0.06F * moved.h[0][i];
+    Vector6d change = Vector6d::Zero();
+    change[0] = 0.06;
+    o.ask_prediction(moved, change, prior);
+    for (std::size_t i = 0; i < 30; ++i) EXPECT_GT(moved.weight[i], 0.8F * before[i]) << i;
 }
 
 }  // namespace
