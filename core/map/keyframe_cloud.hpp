@@ -18,7 +18,7 @@ inline void build_keyframe_cloud(const PlacedPoints& placed, const Eigen::Vector
     cloud.nz = placed.nz;
 }
 
-/// Copies a keyframe's points without those whose pixel belongs to something that may move.
+/// Copies a keyframe's points without those whose pixel belongs to something that moves.
 /// @param is_moving_pixel bool(PixelIndex)
 template <class Predicate>
 void build_keyframe_cloud(const Frame& frame, Predicate&& is_moving_pixel, KeyframeCloud& cloud) {

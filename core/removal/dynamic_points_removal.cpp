@@ -80,11 +80,10 @@ void DynamicPointsRemoval::label_pixels(Frame& frame) const {
 }
 
 void DynamicPointsRemoval::fill_keyframe(const Frame& frame, OdometryFeedback& feedback) const {
-    const auto may_move = [&](PixelIndex pixel) {
-        const std::uint8_t label = frame.detection.label[pixel];
-        return label == kDynamic || label == kUndecided;
-    };
-    build_keyframe_cloud(frame, may_move, feedback.keyframe);
+    // What is not decided yet mostly stands still, and there may be much of it when a map begins: without it little
+    // tells the motion. Should it turn out to move, its past is cleared.
+    const auto moves = [&](PixelIndex pixel) { return frame.detection.label[pixel] == kDynamic; };
+    build_keyframe_cloud(frame, moves, feedback.keyframe);
     feedback.has_keyframe = true;
 }
 
