@@ -204,6 +204,10 @@ bool TrackedObject::goes_before(const TrackedObject& other) const {
     return was_dynamic_ != other.was_dynamic_ ? was_dynamic_ : hits_ > other.hits_;
 }
 
+void TrackedObject::take_past(TrackedObject& other, std::vector<OrientedBox>& cleared) {
+    if (belief_.state() == DynamicState::kDynamic) other.history_.release(cleared);
+}
+
 void TrackedObject::join(const OrientedBox& part) {
     const Growth growth = enclosing_growth(filter_.box(), part);
     filter_.grow(growth.front, growth.back, growth.left, growth.right);

@@ -42,6 +42,8 @@ class TrackedObject {
 
     /// Of two tracks on one object that which was dynamic, and has been seen for longer, is known to others.
     bool goes_before(const TrackedObject& other) const;
+    /// The other's past is this one's, too: it is to be cleared where this object moves.
+    void take_past(TrackedObject& other, std::vector<OrientedBox>& cleared);
     /// What had a track of its own is a part of it: it is so much larger.
     void join(const OrientedBox& part);
 

@@ -99,7 +99,8 @@ struct Tracker::State {
 
     void predict(const Frame& frame);
     void associate(Frame& frame);
-    void join_pieces(const Frame& frame);
+    void give_way(std::size_t guest, TrackedObject& host, std::vector<OrientedBox>& cleared);
+    void join_pieces(Frame& frame);
     void attach_parts(Frame& frame);
     void see_and_miss(Frame& frame);
     void give_birth(Frame& frame);
@@ -189,8 +190,14 @@ void Tracker::State::associate(Frame& frame) {
     }
 }
 
+// What was a part of another object all the time leaves it its past.
+void Tracker::State::give_way(std::size_t guest, TrackedObject& host, std::vector<OrientedBox>& cleared) {
+    absorbed[guest] = 1;
+    if (host.drives()) host.take_past(objects[guest], cleared);
+}
+
 // One of two tracks on one vehicle gives its piece to the other, whose box takes it in.
-void Tracker::State::join_pieces(const Frame& frame) {
+void Tracker::State::join_pieces(Frame& frame) {
     const auto& detections = frame.detection.detections;
     owned.clear();
     for (std::size_t d = 0; d < detections.size(); ++d) {
@@ -213,7 +220,7 @@ void Tracker::State::join_pieces(const Frame& frame) {
             if (object_of(of_guest).goes_before(object_of(of_host))) std::swap(of_host, of_guest);
             object_of(of_host).join(detections[of_guest].box);
             expected[static_cast<std::size_t>(owner[of_host])].whole = object_of(of_host).box();
-            absorbed[static_cast<std::size_t>(owner[of_guest])] = 1;
+            give_way(static_cast<std::size_t>(owner[of_guest]), object_of(of_host), frame.detection.cleared);
             owner[of_guest] = owner[of_host];
         }
     }
@@ -277,7 +284,10 @@ void Tracker::State::attach_parts(Frame& frame) {
                 limb[d] = distance_m > kPartMargin_m && !rest && !host.drives() ? 1 : 0;
             }
         }
-        if (own >= 0 && owner[d] != own) absorbed[static_cast<std::size_t>(own)] = 1;
+        if (own >= 0 && owner[d] != own) {
+            give_way(static_cast<std::size_t>(own), objects[static_cast<std::size_t>(owner[d])],
+                     frame.detection.cleared);
+        }
     }
 }
 
