@@ -105,12 +105,13 @@ TEST_F(DynamicPointsRemovalTest, AnInvalidPoseKnowsNoGroundAndNoMotion) {
     EXPECT_FALSE(feedback.has_keyframe);
 }
 
-TEST_F(DynamicPointsRemovalTest, KeyframesHoldStaticPointsOnly) {
+TEST_F(DynamicPointsRemovalTest, KeyframesHoldWhatDoesNotMove) {
     scene.frame.odometry.keyframe = true;
     scene.frame.odometry.T_world_sensor.translation() = Eigen::Vector3d(1, 2, 3);
     removal.process(scene.frame, feedback);
     ASSERT_TRUE(feedback.has_keyframe);
-    EXPECT_EQ(feedback.keyframe.x.size(), pixels[1].size() + 2);  // the static object, background, ground
+    // All but the dynamic object, and one point each of background and ground.
+    EXPECT_EQ(feedback.keyframe.x.size(), pixels[1].size() + pixels[2].size() + pixels[3].size() + 2);
     EXPECT_EQ(feedback.keyframe.nz.size(), feedback.keyframe.x.size());
     EXPECT_EQ(feedback.keyframe.nz[0], 1.0F);
     EXPECT_EQ(feedback.keyframe.T_world_sensor.translation(), Eigen::Vector3d(1, 2, 3));
