@@ -27,7 +27,7 @@ constexpr int kBootstrapIterations = 10;
 constexpr double kSameViewShare = 0.85;
 // For the same: surfaces by the direction that they face in the plan, and points of one that make it count.
 constexpr std::size_t kViewDirections = 4;
-constexpr double kMinViewPoints = 20.0;
+constexpr double kMinViewPoints = 100.0;
 // What a robot may be at when it is switched on: velocities to begin with, in eight directions of the horizontal plane.
 constexpr double kFirstSpeeds_mps[] = {5.0, 10.0, 15.0};
 constexpr int kFirstDirections = 8;
@@ -139,15 +139,17 @@ std::size_t Odometry::State::taking_part(const PointSelection& points) {
 void Odometry::State::bootstrap(const Frame& frame) {
     const MotionFilter unmoved = first_filter;
     register_frame(frame, kBootstrapIterations, 1.0);
+    is_trustworthy();
     first_filter = sees_the_same(frame.prepared.points) ? unmoved : likeliest_start(frame, unmoved);
     begin_again(frame);
     settle(frame, kBootstrapPasses, kBootstrapIterations);
     register_frame(frame, kBootstrapIterations, 1.0);
 }
 
-/// The first scan is seen again, by its surfaces of every direction: in a street, facades and ground look the same
-/// from everywhere, and only the little that faces along it tells a motion.
+/// The first scan is seen again, as a whole and by its surfaces of every direction: in a street, facades and ground look
+/// the same from everywhere, and only the little that faces along it tells a motion.
 bool Odometry::State::sees_the_same(const PointSelection& points) const {
+    if (static_cast<double>(near) < kSameViewShare * static_cast<double>(candidates)) return false;
     std::array<double, kViewDirections> seen{};
     std::array<double, kViewDirections> again{};
     const auto count = [](std::array<double, kViewDirections>& counts, float nx, float ny) {
