@@ -146,8 +146,8 @@ void Odometry::State::bootstrap(const Frame& frame) {
     register_frame(frame, kBootstrapIterations, 1.0);
 }
 
-/// The first scan is seen again, as a whole and by its surfaces of every direction: in a street, facades and ground look
-/// the same from everywhere, and only the little that faces along it tells a motion.
+/// The first scan is seen again, as a whole and by its surfaces of every direction: in a street, facades and ground
+/// look the same from everywhere, and only the little that faces along it tells a motion.
 bool Odometry::State::sees_the_same(const PointSelection& points) const {
     if (static_cast<double>(near) < kSameViewShare * static_cast<double>(candidates)) return false;
     std::array<double, kViewDirections> seen{};
