@@ -82,8 +82,7 @@ void place_points(std::size_t count, const PixelIndex* __restrict pixel, const f
 
 /// A moving object, seen in this frame, that is too large to be seen as one.
 bool is_seen_in_pieces(const Track& track) {
-    return track.state == DynamicState::kDynamic && track.points > 0 &&
-           track.box.size_m.head<2>().maxCoeff() >= kSeenInPieces_m;
+    return track.state == DynamicState::kDynamic && track.points > 0 && track.box.longest_m() >= kSeenInPieces_m;
 }
 
 /// Where the pieces of such an object are.
@@ -187,8 +186,6 @@ std::vector<CellTable::Entry> GlobalMap::snapshot() const {
     return s.cells.entries([&](const Persistence& seen) { return seen.confirmed() || seen.span_ds() >= enough_ds; });
 }
 
-// Every fourth row, another one each time, so that four frames see all; of near surfaces, which fill many pixels of a
-// row, fewer.
 void GlobalMap::State::postpone(const Frame& frame, Postponed& out) {
     out.points.resize(0);
     out.cleared.clear();

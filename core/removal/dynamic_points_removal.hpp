@@ -20,7 +20,7 @@ struct RemovalConfig {
 
 /// Fills frame.detection.label, .instance (0 before: take_back()) and .dynamic_points from this frame's detections
 /// alone (a track that is only predicted marks no pixel), and the feedback to the odometry: boxes of moving objects,
-/// boxes to clear, and the keyframe without the points of objects that are not static. Grows frame.detection.cleared by
+/// boxes to clear, and the keyframe without the points of objects that are dynamic. Grows frame.detection.cleared by
 /// the margin. A frame whose odometry is not valid knows no ground and no moving object.
 class DynamicPointsRemoval {
   public:

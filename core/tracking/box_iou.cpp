@@ -111,17 +111,19 @@ double footprint_distance_m(const OrientedBox& box, const Eigen::Vector3d& point
     return Footprint(box).distance_m(point_m);
 }
 
+double width_along(const OrientedBox& box, const Eigen::Vector2d& axis) {
+    const double c = std::cos(box.yaw_rad), s = std::sin(box.yaw_rad);
+    return std::abs(axis.x() * c + axis.y() * s) * box.size_m.x() +
+           std::abs(axis.y() * c - axis.x() * s) * box.size_m.y();
+}
+
 Eigen::Vector2d joint_size(const OrientedBox& a, const OrientedBox& b, double yaw_rad) {
     const Eigen::Vector2d along(std::cos(yaw_rad), std::sin(yaw_rad));
     const Eigen::Vector2d across(-along.y(), along.x());
-    const auto half = [](const OrientedBox& box, const Eigen::Vector2d& axis) {
-        const double c = std::cos(box.yaw_rad), s = std::sin(box.yaw_rad);
-        return 0.5 * (std::abs(axis.x() * c + axis.y() * s) * box.size_m.x() +
-                      std::abs(axis.y() * c - axis.x() * s) * box.size_m.y());
-    };
     const auto reach = [&](const Eigen::Vector2d& axis) {
         const double at = axis.dot((b.center_m - a.center_m).head<2>());
-        return std::max(half(a, axis), at + half(b, axis)) - std::min(-half(a, axis), at - half(b, axis));
+        const double half_a = 0.5 * width_along(a, axis), half_b = 0.5 * width_along(b, axis);
+        return std::max(half_a, at + half_b) - std::min(-half_a, at - half_b);
     };
     return {reach(along), reach(across)};
 }

@@ -33,6 +33,9 @@ class Footprint {
 /// Distance [m] in the ground plane from a point to a box, 0 inside.
 double footprint_distance_m(const OrientedBox& box, const Eigen::Vector3d& point_m);
 
+/// How far a box reaches along a direction (unit) in the ground plane, metres.
+double width_along(const OrientedBox& box, const Eigen::Vector2d& axis);
+
 /// How far two boxes together reach along and across a direction in the ground plane, metres.
 Eigen::Vector2d joint_size(const OrientedBox& a, const OrientedBox& b, double yaw_rad);
 

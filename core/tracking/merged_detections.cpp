@@ -77,9 +77,9 @@ bool MergedDetections::divide(Frame& frame, DetectionShapes& shapes, std::span<c
             });
             if (twice) continue;
             covered_.push_back(t);
-            longest = std::max(longest, tracks[t].visible.size_m.head<2>().maxCoeff());
+            longest = std::max(longest, tracks[t].visible.longest_m());
         }
-        const bool divided = covered_.size() > 1 && detection.box.size_m.head<2>().maxCoeff() > kLonger * longest &&
+        const bool divided = covered_.size() > 1 && detection.box.longest_m() > kLonger * longest &&
                              share_out(detection, shapes, tracks);
         const auto moves_alone = [&](std::size_t t) { return cut_out(detection, shapes, tracks[t]); };
         const bool cut = !divided && std::any_of(covered_.begin(), covered_.end(), moves_alone);
@@ -127,7 +127,7 @@ bool MergedDetections::share_out(const Detection& whole, const DetectionShapes& 
     }
     double tallest_m = 0.0;
     for (const std::size_t t : covered_) tallest_m = std::max(tallest_m, tracks[t].whole.size_m.z());
-    const bool small = whole.box.size_m.head<2>().maxCoeff() < kLargestBody_m * static_cast<double>(covered_.size());
+    const bool small = whole.box.longest_m() < kLargestBody_m * static_cast<double>(covered_.size());
     bodies_ = small && std::all_of(covered_.begin(), covered_.end(), [&](std::size_t t) {
                   const Eigen::Vector3d size = tracks[t].whole.size_m;
                   return size.head<2>().maxCoeff() < kLargestBody_m && size.z() > kLeastHeight * tallest_m;

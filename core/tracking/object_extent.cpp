@@ -99,8 +99,8 @@ ExtentMeasurement complete_extent(const OrientedBox& visible, const Eigen::Vecto
     const Eigen::Vector2d along(std::cos(visible.yaw_rad), std::sin(visible.yaw_rad));
     const Eigen::Vector2d across(-along.y(), along.x());
     const Eigen::Vector2d offset = (visible.center_m - remembered.center_m).head<2>();
-    const bool piece = moves && remembered.size_m.head<2>().maxCoeff() < kLimbs_m &&
-                       visible.size_m.z() < kMostOfIt * remembered.size_m.z();
+    const bool piece =
+        moves && remembered.longest_m() < kLimbs_m && visible.size_m.z() < kMostOfIt * remembered.size_m.z();
     const auto ends = [&](const Eigen::Vector2d& axis) {
         return piece ? HiddenEnds{true, true} : hidden_ends(axis, visible, visibility);
     };

@@ -104,7 +104,7 @@ std::pair<double, double> TrackedObject::measured_yaw(const PointSpan& points) {
     if (heads) filter_.align_axes(heading);
     // The sides of a long object are known better than its heading; those of a thing at rest do not turn.
     const bool rests = belief_.state() == DynamicState::kStatic && age_ % kSidesFrames != 0;
-    if (!rests && std::max(filter_.box().size_m.head<2>().maxCoeff(), visible_.size_m.head<2>().maxCoeff()) > kLong_m) {
+    if (!rests && std::max(filter_.box().longest_m(), visible_.longest_m()) > kLong_m) {
         if (const auto sides = rectangle_yaw(points)) {
             const double turn = std::remainder(*sides - heading, 0.5 * std::numbers::pi);
             if (!heads || std::abs(turn) < kMostSlip_rad) return {wrap_angle(heading + turn), 0.1};
@@ -216,9 +216,9 @@ void TrackedObject::join(const OrientedBox& part) {
 void TrackedObject::leave_background(const Visibility& visibility) {
     OrientedBox part = visible_;
     part.center_m += filter_.box().center_m;
-    const double longest_m = part.size_m.head<2>().maxCoeff();
+    const double longest_m = part.longest_m();
     const bool body = longest_m < kBody_m && longest_m < part.size_m.z() && filter_.speed() < kRunning_mps;
-    if (!body || filter_.box().size_m.head<2>().maxCoeff() < kTwoBodies_m) return;
+    if (!body || filter_.box().longest_m() < kTwoBodies_m) return;
     const Growth other = surplus(filter_.box(), assumed_box(part, visibility));
     filter_.grow(other.front, other.back, other.left, other.right);
 }
@@ -307,12 +307,12 @@ bool TrackedObject::under_way() const {
 }
 
 bool TrackedObject::drives() const {
-    return under_way() && filter_.box().size_m.head<2>().maxCoeff() > kVehicle_m;
+    return under_way() && filter_.box().longest_m() > kVehicle_m;
 }
 
 bool TrackedObject::sets_off() const {
     return belief_.state() == DynamicState::kStatic && hits_ >= kEstablishedHits &&
-           filter_.box().size_m.head<2>().maxCoeff() > kVehicle_m && filter_.speed() > 2.0 * filter_.velocity_sd();
+           filter_.box().longest_m() > kVehicle_m && filter_.speed() > 2.0 * filter_.velocity_sd();
 }
 
 ExpectedTrack TrackedObject::expected() const {

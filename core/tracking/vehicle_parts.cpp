@@ -38,20 +38,10 @@ constexpr double kFront_m = 0.8;
 constexpr double kBehind_m = 1.0;  // what is farther than both pieces is seen between them
 constexpr int kPlaces = 5;
 
-double width_across(const OrientedBox& box, const Eigen::Vector2d& axis) {
-    const double c = std::cos(box.yaw_rad), s = std::sin(box.yaw_rad);
-    return std::abs(axis.x() * c + axis.y() * s) * box.size_m.x() +
-           std::abs(axis.y() * c - axis.x() * s) * box.size_m.y();
-}
-
-double longest_m(const OrientedBox& box) {
-    return box.size_m.head<2>().maxCoeff();
-}
-
 /// Bumper and windscreen: both wider than people, the lower one lower, too.
 bool are_front(const OrientedBox& a, const OrientedBox& b, const Eigen::Vector2d& across) {
     const OrientedBox& lower = a.center_m.z() < b.center_m.z() ? a : b;
-    return lower.size_m.z() < kBumperHeight_m && std::min(width_across(a, across), width_across(b, across)) > kFront_m;
+    return lower.size_m.z() < kBumperHeight_m && std::min(width_along(a, across), width_along(b, across)) > kFront_m;
 }
 
 /// Whether something farther than both is seen between two detections.
@@ -72,7 +62,7 @@ bool gap_between(const Detection& a, const Detection& b, const Frame& frame, con
 bool is_rest_of(const TrackedObject& host, const Detection& front, const Detection& rest) {
     const OrientedBox box = host.box();
     return host.state() == DynamicState::kDynamic && host.hits() >= kKnownHits &&
-           joint_size(front.box, rest.box, box.yaw_rad).maxCoeff() < kRestSize * box.size_m.head<2>().maxCoeff() &&
+           joint_size(front.box, rest.box, box.yaw_rad).maxCoeff() < kRestSize * box.longest_m() &&
            rest.box.size_m.z() < kRestSize * box.size_m.z();
 }
 
@@ -93,7 +83,7 @@ bool is_at_front_of(const Detection& rest, const Detection& front) {
     const Eigen::Vector2d joint_m = joint_size(box, front.box, yaw);
     const bool vehicle =
         joint_m.x() > kShortest_m && joint_m.x() < kLongest_m && joint_m.y() > kNarrowest_m && joint_m.y() < kWidest_m;
-    return vehicle && width_across(front.box, across) > std::max(kNarrowest_m, kFrontWidth * joint_m.y()) &&
+    return vehicle && width_along(front.box, across) > std::max(kNarrowest_m, kFrontWidth * joint_m.y()) &&
            std::abs(along.dot((front.box.center_m - box.center_m).head<2>())) > kAtTheEnd * joint_m.x();
 }
 
@@ -125,7 +115,7 @@ bool pieces_of_one_vehicle(const TrackedObject& a, const Detection& seen_a, cons
     const double yaw = std::atan2(va.y() + vb.y(), va.x() + vb.x());
     const Eigen::Vector2d joint_m = joint_size(seen_a.box, seen_b.box, yaw);
     if (joint_m.x() > kLongest_m || joint_m.y() > kWidest_m) return false;
-    const bool larger = std::max(longest_m(a.box()), longest_m(b.box())) > kLonger_m;
+    const bool larger = std::max(a.box().longest_m(), b.box().longest_m()) > kLonger_m;
     const Eigen::Vector2d across(-std::sin(yaw), std::cos(yaw));
     if (speed < (larger ? kDriving_mps : kRunning_mps) && !are_front(a.box(), b.box(), across)) return false;
     return !gap_between(seen_a, seen_b, frame, projection);

@@ -16,14 +16,10 @@ constexpr double kAgreement = 0.4;  // of the way, from what the velocity predic
 constexpr double kOwn = 0.5;        // of the way, that the sensor's does not explain
 constexpr int kSteadyFrames = 3;
 
-double longest_m(const OrientedBox& box) {
-    return box.size_m.head<2>().maxCoeff();
-}
-
 }  // namespace
 
 bool WalkedWay::steady(const WholeSight& now, const Eigen::Vector2d& velocity_mps) const {
-    const double least_m = std::max({kLeast_m, longest_m(before_.visible), longest_m(now.visible)});
+    const double least_m = std::max({kLeast_m, before_.visible.longest_m(), now.visible.longest_m()});
     if (visible_shift_m(before_.visible, now.visible) < least_m) return false;
     const Eigen::Vector2d way = (now.visible.center_m - before_.visible.center_m).head<2>();
     const double elapsed_s = now.time_s - before_.time_s;
@@ -35,7 +31,7 @@ bool WalkedWay::steady(const WholeSight& now, const Eigen::Vector2d& velocity_mp
 bool WalkedWay::update(const WholeSight& now, bool whole, const Eigen::Vector2d& velocity_mps) {
     if (now.time_s - last_s_ > kGap_s) started_ = false;
     last_s_ = now.time_s;
-    if (!whole || longest_m(now.visible) > std::min(kSmall_m, now.visible.size_m.z())) {
+    if (!whole || now.visible.longest_m() > std::min(kSmall_m, now.visible.size_m.z())) {
         steady_ = 0;
         return false;
     }

@@ -11,6 +11,8 @@ struct OrientedBox {
     double yaw_rad = 0.0;                              ///< direction of the length axis, about +z
     Eigen::Vector3d size_m = Eigen::Vector3d::Zero();  ///< length (along yaw), width, height
 
+    /// The longer side of the footprint.
+    double longest_m() const { return size_m.head<2>().maxCoeff(); }
     /// True where the point lies inside the box grown by `margin_m` on every side.
     bool contains(const Eigen::Vector3d& p, double margin_m = 0.0) const {
         const Eigen::Vector3d d = p - center_m;
