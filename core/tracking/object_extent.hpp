@@ -10,6 +10,9 @@ struct Visibility {
     Eigen::Vector3d sensor_m = Eigen::Vector3d::Zero();  ///< where it was seen from, world frame
     bool occluded_left = false;                          ///< a nearer surface borders it, seen from the sensor
     bool occluded_right = false;
+
+    /// Both ends of what is seen are edges of something nearer: it seems to move as these do, whatever it does itself.
+    bool through_gap() const { return occluded_left && occluded_right; }
 };
 
 /// How much longer an object has proved to be than was known, at each end of its axes, metres.

@@ -272,6 +272,8 @@ void TrackedObject::displacement_cue(const Frame& frame, const Sighting& sightin
         const double elapsed_s = before_.age_s - now.age_s;
         const auto r = register_displacement(before_, now, center - before_center_m_);
         cues.displacement_log_odds = displacement_log_odds(r, elapsed_s);
+        if (sighting.visibility.through_gap() && cues.free_points == 0)
+            cues.displacement_log_odds = std::min(cues.displacement_log_odds, 0.0);
         const double length_m = r.displacement_m.norm();
         const auto agrees_with = [&](const Eigen::Vector2d& velocity_mps) {
             return (r.displacement_m - elapsed_s * velocity_mps).norm() < kAgreement * length_m;

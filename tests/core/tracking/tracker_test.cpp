@@ -396,6 +396,26 @@ TEST_F(TrackerTest, DynamicIsNotForEver) {
     EXPECT_EQ(ids.size(), 1U);
 }
 
+TEST_F(TrackerTest, WhatIsSeenThroughAGapDoesNotMoveWithTheGap) {
+    const auto ever_dynamic = [&](bool gap) {
+        Tracker tracker(sensor, config);
+        bool dynamic = false;
+        for (int k = 0; k < 20; ++k) {
+            scene.next();
+            Detection& seen = scene.add(person(6.0, -1.5 + 0.15 * k));
+            // Nothing was ever seen there, and little of the map is near.
+            seen.unknown_points = seen.free_points + seen.occupied_points;
+            seen.free_points = seen.occupied_points = 0;
+            seen.occluded_left = seen.occluded_right = gap;
+            tracker.process(scene.frame);
+            for (const Track& t : scene.frame.detection.tracks) dynamic |= t.state == DynamicState::kDynamic;
+        }
+        return dynamic;
+    };
+    EXPECT_TRUE(ever_dynamic(false));
+    EXPECT_FALSE(ever_dynamic(true));
+}
+
 TEST_F(TrackerTest, ALateDecisionHandsOutTheWholePast) {
     Tracker tracker(sensor, config);
     std::vector<OrientedBox> cleared;
