@@ -19,17 +19,7 @@ function(dlod_add_test_folder folder)
   string(REPLACE "/" "_" name ${folder})
   add_executable(test_${name} ${sources})
   target_link_libraries(test_${name} PRIVATE ${ARG_LINK} dlod_test_main)
-  # The tests' own code compiles a quarter faster so; what they test is optimised in full.
-  target_compile_options(test_${name} PRIVATE $<$<CONFIG:Release>:-O1>)
-  # The first program's precompiled headers serve all: that one has no definitions that others lack.
-  get_property(precompiled GLOBAL PROPERTY dlod_test_precompiled)
-  if(precompiled)
-    target_precompile_headers(test_${name} REUSE_FROM ${precompiled})
-  else()
-    target_precompile_headers(test_${name} PRIVATE <gtest/gtest.h> <Eigen/Dense> <Eigen/Geometry> <algorithm> <array>
-                              <chrono> <cmath> <filesystem> <fstream> <functional> <map> <memory> <random> <string> <vector>)
-    set_property(GLOBAL PROPERTY dlod_test_precompiled test_${name})
-  endif()
+  target_precompile_headers(test_${name} REUSE_FROM dlod_test_main)
   string(REGEX MATCH "^[^/]+" top ${folder})
   if(NOT TARGET tests_${top})
     add_custom_target(tests_${top})
