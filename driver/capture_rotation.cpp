@@ -1,11 +1,14 @@
 #include "driver/capture_rotation.hpp"
 
 #include <time.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <charconv>
 #include <cstdio>
+#include <cstring>
 #include <fstream>
 #include <utility>
 #include <vector>
@@ -41,6 +44,13 @@ std::vector<Numbered> list_captures(const std::filesystem::path& folder, const s
     return all;
 }
 
+/// With the metadata beside it.
+void remove_capture(std::filesystem::path path) {
+    std::error_code ignored;  // what cannot be removed is tried again with the next file
+    std::filesystem::remove(path, ignored);
+    std::filesystem::remove(path.replace_extension(".json"), ignored);
+}
+
 std::string utc(std::int64_t time_ns) {
     const std::time_t seconds = time_ns / 1'000'000'000;
     std::tm parts{};
@@ -60,24 +70,30 @@ CaptureRotation::CaptureRotation(RotationOptions options) : options_(std::move(o
 bool CaptureRotation::fail(std::string error, std::int64_t time_ns) {
     error_ = std::move(error);
     last_ns_ = time_ns;
+    const bool empty = writer_ != nullptr && writer_->size() == 0;
     writer_.reset();
+    // While a disk stays full every attempt would leave a file without packets, in the place of one with.
+    if (empty) remove_capture(file_);
     return false;
 }
 
 void CaptureRotation::remove_oldest(int keep) {
     auto captures = list_captures(options_.folder, options_.prefix);
-    std::error_code ignored;  // a file that cannot be removed is tried again with the next
-    for (std::size_t i = 0; i + static_cast<std::size_t>(keep) < captures.size(); ++i) {
-        std::filesystem::remove(captures[i].path, ignored);
-        std::filesystem::remove(captures[i].path.replace_extension(".json"), ignored);
-    }
+    for (std::size_t i = 0; i + static_cast<std::size_t>(keep) < captures.size(); ++i) remove_capture(captures[i].path);
+}
+
+bool CaptureRotation::prepare() {
+    std::error_code error;
+    std::filesystem::create_directories(options_.folder, error);
+    if (error) return fail(options_.folder.string() + ": cannot be created: " + error.message(), last_ns_);
+    if (::access(options_.folder.c_str(), W_OK | X_OK) == 0) return true;
+    return fail(options_.folder.string() + ": cannot be written: " + std::strerror(errno), last_ns_);
 }
 
 bool CaptureRotation::open(std::int64_t time_ns) {
     writer_.reset();
-    std::error_code error;
-    std::filesystem::create_directories(options_.folder, error);
-    if (error) return fail(options_.folder.string() + ": cannot be created: " + error.message(), time_ns);
+    last_ns_ = time_ns;
+    if (!prepare()) return false;
     // Before the new one comes: the number holds at every moment.
     remove_oldest(options_.files - 1);
     const auto captures = list_captures(options_.folder, options_.prefix);
@@ -94,8 +110,7 @@ bool CaptureRotation::open(std::int64_t time_ns) {
         json << options_.metadata;
         if (!json.flush()) {
             fail(beside.string() + ": cannot be written", time_ns);
-            std::filesystem::remove(file_, error);
-            std::filesystem::remove(beside, error);
+            remove_capture(file_);
             return false;
         }
     }
@@ -115,6 +130,8 @@ bool CaptureRotation::write(const Packet& packet) {
         if (!writer_->ok()) return fail(writer_->error(), now_ns);
         return false;
     }
+    // After a failure it goes on once a packet is on the disk, not when it is in memory.
+    if (!error_.empty() && !flush()) return false;
     last_ns_ = now_ns;
     error_.clear();
     return true;

@@ -23,10 +23,13 @@ struct RotationOptions {
 
 /// Writes packets to PREFIX_NUMBER_TIME.pcap in a folder, each with the sensor's metadata in a .json of the same name,
 /// and removes the oldest beyond the number to keep. The first packet after a failure (a full disk, say) that comes
-/// `retry_ns` later opens a new file. Not thread-safe.
+/// `retry_ns` later opens a new file; files without packets are not left behind. Not thread-safe.
 class CaptureRotation {
   public:
     explicit CaptureRotation(RotationOptions options);
+
+    /// Makes the folder. Returns false if it cannot be written; error() then says why. The first packet tries again.
+    bool prepare();
 
     /// Returns false if the packet was not written; error() then says why.
     bool write(const Packet& packet);

@@ -144,7 +144,9 @@ struct OutputConfig {
 
     template <class V>
     void visit(V& v) {
-        v.text("folder", folder, "where trajectory, frames, labels, tracks and map are written; empty: nowhere");
+        v.text("folder", folder,
+               "where trajectory, frames, labels, tracks and map are written; of a service as recording.folder; "
+               "empty: nowhere");
         v.choice("timing", timing, {"wall", "cpu"},
                  "what the stage columns of frames.csv measure: elapsed time or the thread's CPU time");
     }

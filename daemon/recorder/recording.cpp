@@ -65,6 +65,9 @@ void Recording::add(const driver::Packet& packet) {
 }
 
 void Recording::write_until_stopped() {
+    // A folder that cannot be used is named at the start, not when the sensor comes.
+    rotation_.prepare();
+    report_trouble();
     // What was queued before the stop was requested is written: the request is seen first, the queue emptied after it.
     bool stopping = false;
     for (int period = 1; !stopping; ++period) {

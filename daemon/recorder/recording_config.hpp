@@ -18,7 +18,9 @@ struct RecordingConfig {
     template <class V>
     void visit(V& v) {
         v.text("folder", folder,
-               "where received packets are recorded as captures (pcap) that can be replayed; empty: nowhere");
+               "where received packets are recorded as captures (pcap) that can be replayed; a relative path of a "
+               "service is in its state directory, any other place its unit must allow (ReadWritePaths=); empty: "
+               "nowhere");
         v.parameter("file_megabytes", file_megabytes, Range{1, 1'000'000}, "MB", "size at which a new file is begun");
         v.parameter("files", files, Range{1, 100'000}, "files", "files kept at most; the oldest is removed");
         v.parameter("buffer_megabytes", buffer_megabytes, Range{1, 4096}, "MB",

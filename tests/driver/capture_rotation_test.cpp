@@ -10,6 +10,7 @@
 #include "driver/network_address.hpp"
 #include "driver/pcap_source.hpp"
 #include "tests/support/network_bytes.hpp"
+#include "tests/support/small_disk.hpp"
 
 namespace dlod::driver {
 namespace {
@@ -102,6 +103,52 @@ TEST(CaptureRotation, TriesAgainAfterAFailure) {
     EXPECT_TRUE(write(rotation, 2, kStart_ns + 11 * kSecond));
     EXPECT_TRUE(rotation.error().empty());
     EXPECT_TRUE(rotation.flush());
+}
+
+TEST(CaptureRotation, AFolderThatCannotBeUsedIsNamedBeforeAPacketComes) {
+    const ScratchFolder scratch;
+    scratch.write("blocked", {});
+    CaptureRotation blocked({.folder = scratch.file("blocked")});
+    EXPECT_FALSE(blocked.prepare());
+    EXPECT_NE(blocked.error().find("blocked"), std::string::npos) << blocked.error();
+    CaptureRotation usable({.folder = scratch.file("new") / "folder"});
+    EXPECT_TRUE(usable.prepare()) << usable.error();
+    EXPECT_TRUE(usable.error().empty());
+}
+
+TEST(CaptureRotation, AFullDiskCostsNeitherWhatWasRecordedNorLeavesFilesWithoutPackets) {
+    const test::SmallDisk disk(16 << 20);
+    if (!disk.usable()) GTEST_SKIP() << "no file system can be mounted here";
+    CaptureRotation rotation({.folder = disk.path(), .file_bytes = 2 << 20, .files = 10, .metadata = "{}"});
+    std::uint32_t n = 0;
+    std::int64_t time_ns = kStart_ns;
+    while (rotation.files() < 3) ASSERT_TRUE(write(rotation, n++, time_ns += 1000)) << rotation.error();
+    ASSERT_TRUE(rotation.flush());
+
+    disk.fill();
+    while (rotation.error().empty()) write(rotation, n++, time_ns += 1000);
+    EXPECT_NE(rotation.error().find("No space left"), std::string::npos) << rotation.error();
+    const auto recorded = files(disk.path(), ".pcap");
+    ASSERT_GE(recorded.size(), 3U);
+    for (int attempt = 0; attempt < 20; ++attempt) {
+        EXPECT_FALSE(write(rotation, n++, time_ns += 11 * kSecond));
+        EXPECT_FALSE(rotation.error().empty());
+    }
+    const auto left = files(disk.path(), ".pcap");
+    EXPECT_EQ(left, recorded);
+    EXPECT_EQ(files(disk.path(), ".json").size(), left.size());
+    for (const auto& capture : left) {
+        PcapSource source(capture);
+        std::size_t packets = 0;
+        for (auto batch = source.next(); batch.status == SourceStatus::kPackets; batch = source.next()) {
+            packets += batch.packets.size();
+        }
+        EXPECT_GT(packets, 0U) << capture;
+        EXPECT_TRUE(source.take_warnings().empty()) << capture;
+    }
+    disk.clear();
+    EXPECT_TRUE(write(rotation, n++, time_ns += 11 * kSecond)) << rotation.error();
+    EXPECT_TRUE(rotation.error().empty());
 }
 
 }  // namespace

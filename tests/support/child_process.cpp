@@ -1,7 +1,6 @@
 #include "tests/support/child_process.hpp"
 
 #include <fcntl.h>
-#include <sched.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -13,6 +12,8 @@
 #include <sstream>
 #include <stdexcept>
 #include <thread>
+
+#include "tests/support/namespaces.hpp"
 
 namespace dlod::test {
 
@@ -79,7 +80,7 @@ std::string ChildProcess::output() const {
 }
 
 bool enter_network_namespace() {
-    if (::unshare(CLONE_NEWNET) != 0 && ::unshare(CLONE_NEWUSER | CLONE_NEWNET) != 0) return false;
+    if (!enter_namespaces(CLONE_NEWNET)) return false;
     return std::system("ip link set lo up && ip link set lo multicast on && ip route add 224.0.0.0/4 dev lo") == 0;
 }
 

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "tests/support/file_content.hpp"
+#include "tests/support/small_disk.hpp"
 #include "tests/support/synthetic_capture.hpp"
 
 namespace dlod::daemon {
@@ -193,6 +194,25 @@ TEST(MapStore, AFullFolderTakesNoFurtherMap) {
     EXPECT_FALSE(result.ok);
     EXPECT_NE(result.text.find("saved_maps.most"), std::string::npos) << result.text;
     EXPECT_TRUE(store.save("b", points(2)).ok) << "one that is there can be replaced";
+}
+
+TEST(MapStore, OnAFullDiskTheOldMapStaysAndTheAnswerSaysWhy) {
+    const test::SmallDisk disk(4 << 20);
+    if (!disk.usable()) GTEST_SKIP() << "no file system can be mounted here";
+    const MapStore store({.folder = disk.path().string()});
+    ASSERT_TRUE(store.save("hall", points(1000)).ok);
+    const auto pcd = content(disk.path() / "hall.pcd");
+    const auto ply = content(disk.path() / "hall.ply");
+    disk.fill(100'000);
+    const auto result = store.save("hall", points(20'000));
+    EXPECT_FALSE(result.ok);
+    EXPECT_NE(result.text.find("No space left"), std::string::npos) << result.text;
+    EXPECT_NE(result.text.find("hall."), std::string::npos) << result.text;
+    EXPECT_TRUE(content(disk.path() / "hall.pcd") == pcd);
+    EXPECT_TRUE(content(disk.path() / "hall.ply") == ply);
+    EXPECT_EQ(files_in(disk.path()), (std::set<std::string>{"filler", "hall.pcd", "hall.ply"}));
+    disk.clear();
+    EXPECT_TRUE(store.save("hall", points(20'000)).ok);
 }
 
 }  // namespace

@@ -118,6 +118,29 @@ TEST(RecordingSource, AFullBufferCostsTheRecordingNotTheCaller) {
     EXPECT_NE(warnings[0].find("too slow"), std::string::npos);
 }
 
+/// Nobody has plugged in the sensor.
+class NoPackets final : public driver::PacketSource {
+  public:
+    driver::PacketBatch next() override { return {}; }
+    void stop() noexcept override {}
+    void visit_counters(const driver::CounterVisitor&) const override {}
+};
+
+TEST(RecordingSource, AFolderThatCannotBeWrittenIsReportedBeforeAPacketComes) {
+    const ScratchFolder scratch;
+    scratch.write("blocked", {});
+    NoPackets nothing;
+    RecordingSource source(nothing, {.folder = scratch.file("blocked").string()}, "{}");
+    std::vector<std::string> warnings;
+    for (int i = 0; i < 500 && warnings.empty(); ++i) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        source.next();
+        warnings = source.take_warnings();
+    }
+    ASSERT_EQ(warnings.size(), 1U);
+    EXPECT_NE(warnings[0].find("blocked"), std::string::npos) << warnings[0];
+}
+
 TEST(RecordingSource, AFolderThatCannotBeWrittenIsReportedOnce) {
     const ScratchFolder scratch;
     scratch.write("blocked", {});
