@@ -376,7 +376,11 @@ void read_ports(const Reader& reader, SensorInfo& info) {
 }  // namespace
 
 std::string SensorInfo::description() const {
-    return product_line + ' ' + serial_number + ' ' + firmware + ' ' + lidar_mode + ' ' + profile_name;
+    std::string text = product_line.empty() ? "sensor of an unknown product line" : product_line;
+    for (const std::string* part : {&serial_number, &firmware, &lidar_mode, &profile_name}) {
+        if (!part->empty()) text += ' ' + *part;
+    }
+    return text;
 }
 
 std::uint64_t SensorInfo::serial() const {

@@ -38,7 +38,7 @@ struct SensorInfo {
     std::vector<std::string> warnings;     ///< what was missing and replaced, or is odd and harmless
 
     PacketLayout layout() const { return {*format, model.height, columns_per_packet}; }
-    /// Product line, serial number, firmware, mode and packet profile, for people.
+    /// Product line, serial number, firmware, mode and packet profile, for people; without what is not known.
     std::string description() const;
     /// Number in serial_number, 0 where it is empty or not a number: packets are then not told apart by it.
     std::uint64_t serial() const;

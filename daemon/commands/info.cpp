@@ -9,17 +9,22 @@
 namespace dlod::daemon {
 namespace {
 
+/// Metadata of old firmware, or written by hand, do not tell everything.
+const char* or_unknown(const std::string& text) {
+    return text.empty() ? "unknown" : text.c_str();
+}
+
 void print_sensor(const driver::SensorInfo& sensor) {
     const auto& model = sensor.model;
-    std::printf("sensor    %s, serial %s, firmware %s\n", sensor.product_line.c_str(), sensor.serial_number.c_str(),
-                sensor.firmware.c_str());
-    std::printf("mode      %s: %d x %d, %.0f Hz, columns %d to %d\n", sensor.lidar_mode.c_str(), model.height,
+    std::printf("sensor    %s, serial %s, firmware %s\n", or_unknown(sensor.product_line),
+                or_unknown(sensor.serial_number), or_unknown(sensor.firmware));
+    std::printf("mode      %s: %d x %d, %.0f Hz, columns %d to %d\n", or_unknown(sensor.lidar_mode), model.height,
                 model.width, 1.0 / model.frame_period_s, model.column_window_first, model.column_window_last);
     std::printf("profile   %s, IMU %s, %d columns a packet\n", sensor.profile_name.c_str(),
                 sensor.imu_profile_name.empty() ? "LEGACY" : sensor.imu_profile_name.c_str(),
                 sensor.columns_per_packet);
     std::printf("ports     lidar %d, IMU %d\n", sensor.lidar_port, sensor.imu_port);
-    std::printf("clock     %s\n", sensor.timestamp_mode.empty() ? "not stated" : sensor.timestamp_mode.c_str());
+    std::printf("clock     %s\n", or_unknown(sensor.timestamp_mode));
     for (const auto& warning : sensor.warnings) std::printf("warning   %s\n", warning.c_str());
 }
 

@@ -177,6 +177,7 @@ TEST(Metadata, WhatIsNotNeededIsAWarning) {
     EXPECT_TRUE(has_warning(info, "sensor_info.prod_line"));
     EXPECT_TRUE(has_warning(info, "ACCEL32_GYRO32_NMEA"));
     EXPECT_EQ(info.serial(), 0U);
+    EXPECT_EQ(info.description(), "sensor of an unknown product line " + info.lidar_mode + " " + info.profile_name);
 }
 
 TEST(Metadata, WhatIsNoMetadataFileIsNamed) {

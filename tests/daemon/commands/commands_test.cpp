@@ -6,10 +6,12 @@
 #include <chrono>
 #include <csignal>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "tests/support/child_process.hpp"
+#include "tests/support/small_disk.hpp"
 #include "tests/support/synthetic_capture.hpp"
 #include "tests/support/test_data.hpp"
 
@@ -95,6 +97,10 @@ TEST_F(CommandsTest, Info) {
     EXPECT_TRUE(
         ends(dlod({"info", capture_}), 0, {"OS-0-32", "123456", "RNG15_RFL8_NIR8", "32 x 512", "frames", "12"}));
     EXPECT_TRUE(ends(dlod({"info", file("drive.json")}), 0, {"OS-0-32", "7502"}));
+    auto reduced = nlohmann::json::parse(test::SyntheticCapture::metadata());
+    for (const char* key : {"prod_line", "prod_sn", "build_rev"}) reduced.erase(key);
+    EXPECT_TRUE(ends(dlod({"info", write("reduced.json", reduced.dump())}), 0,
+                     {"sensor    unknown, serial unknown, firmware unknown\n"}));
 }
 
 TEST_F(CommandsTest, ConfigurationErrorsNameTheKey) {
@@ -187,6 +193,13 @@ TEST_F(CommandsTest, OutputThatCannotBeWritten) {
     // As on a full disk: the 100 kB are reached in the middle of labels.bin.
     EXPECT_TRUE(ends(dlod({"replay", capture_, "--out", file("full")}, {.environment = {}, .largest_file = 100'000}), 5,
                      {"cannot write"}));
+}
+
+TEST_F(CommandsTest, AReplayOntoAFullDiskSaysSo) {
+    const test::SmallDisk disk(300'000);
+    if (!disk.usable()) GTEST_SKIP() << "no file system can be mounted here";
+    EXPECT_TRUE(ends(dlod({"replay", capture_, "--out", (disk.path() / "run").string()}), 5,
+                     {"cannot write", "No space left", "run/"}));
 }
 
 TEST_F(CommandsTest, ASignalEndsAReplayWithAllOutputsComplete) {
