@@ -19,7 +19,7 @@ using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
 constexpr auto kReportPeriod = std::chrono::seconds(1);
-/// Between attempts to open LCM.
+/// Between attempts to open LCM and the sockets.
 constexpr auto kAttemptPeriod = std::chrono::seconds(2);
 /// How long new metadata may wait to be looked for.
 constexpr milliseconds kLookPeriod{100};
@@ -35,6 +35,7 @@ std::string state_directory() {
 LiveService::LiveService(const ConfigSources& sources) : sources_(sources), config_(load_config(sources, nullptr)) {
     set_up_log(config_.log.level);
     start_.start_ns = StepTimer::now_ns(CLOCK_MONOTONIC);
+    start_.is_service = service_.is_service();
     const auto metadata = configured_metadata(config_.sensor);
     watch_ = std::make_unique<SensorWatch>(config_.sensor, metadata, state_directory());
 }
@@ -102,15 +103,24 @@ void LiveService::begin_session_if_asked() {
         session_ = std::make_unique<LiveSession>(config_, *sensor_, next_metadata_->json, start_);
     } catch (const MessageBusError& error) {
         // The network may come up later than the service.
-        messages_trouble_ = error.what();
-        service_.ready(messages_trouble_);
-        next_attempt_ = Clock::now() + kAttemptPeriod;
+        postpone_session(error.what());
+        return;
+    } catch (const driver::SourceError& error) {
+        // So may the sensor's interface; another program may give up its port. By hand, that ends the program.
+        if (!start_.is_service && start_.sessions_before == 0) throw;
+        postpone_session(error.what());
         return;
     }
-    messages_trouble_.clear();
+    session_trouble_.clear();
     next_metadata_.reset();
     waiting_.reset();
     session_->start();
+}
+
+void LiveService::postpone_session(const std::string& trouble) {
+    session_trouble_ = trouble;
+    service_.ready(session_trouble_);
+    next_attempt_ = Clock::now() + kAttemptPeriod;
 }
 
 void LiveService::end_session() {
@@ -122,7 +132,7 @@ void LiveService::end_session() {
 }
 
 void LiveService::report() {
-    const std::string trouble = messages_trouble_.empty() ? watch_->trouble() : messages_trouble_;
+    const std::string trouble = session_trouble_.empty() ? watch_->trouble() : session_trouble_;
     if (trouble != trouble_ && !trouble.empty()) warnings_.warn(trouble, trouble);
     trouble_ = trouble;
     if (session_) {

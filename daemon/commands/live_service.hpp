@@ -30,9 +30,9 @@ class LiveService {
 
   private:
     void handle(SignalWaiter::Event event);
-    void stop();
     void reload_config();
     void begin_session_if_asked();
+    void postpone_session(const std::string& trouble);
     void end_session();
     void report();
 
@@ -47,8 +47,8 @@ class LiveService {
     LiveStart start_;
     std::unique_ptr<WaitingStatus> waiting_;  ///< while there is no session
     std::unique_ptr<LiveSession> session_;
-    std::string trouble_;           ///< as logged last
-    std::string messages_trouble_;  ///< why there is no session although there are metadata
+    std::string trouble_;          ///< as logged last
+    std::string session_trouble_;  ///< why there is no session although there are metadata
     std::chrono::steady_clock::time_point next_attempt_{};
     bool stopping_ = false;
 };

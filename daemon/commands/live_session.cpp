@@ -30,13 +30,6 @@ std::unique_ptr<SessionMessages> make_messages(const Config& config, const drive
     return std::make_unique<SessionMessages>(config.lcm, sensor, config.extrinsics.T_base_sensor());
 }
 
-/// Each session has a folder of its own: one that another sensor ended keeps its results.
-std::unique_ptr<ResultWriter> make_writer(const OutputConfig& config, std::uint64_t sessions_before) {
-    if (config.folder.empty()) return nullptr;
-    const std::string suffix = sessions_before == 0 ? "" : fmt::format("-{}", sessions_before + 1);
-    return std::make_unique<ResultWriter>(config.folder + suffix, static_cast<TimingClock>(config.timing));
-}
-
 /// No packet for so long: the sensor is asked why.
 constexpr std::int64_t kSilence_ns = 2'000'000'000;
 /// Packets that do not fit the metadata, or whose sensor has started anew: it may be another one.
@@ -60,10 +53,11 @@ LiveSession::LiveSession(const Config& config, const driver::SensorInfo& sensor,
       recording_(socket_, config.recording, metadata),
       messages_(make_messages(config, sensor)),
       maps_(config.saved_maps),
-      writer_(make_writer(config.output, start.sessions_before)),
       host_time_(start.host_time),
       board_(DLOD_VERSION, description_, start.start_ns),
-      pipeline_(sensor, config.method, config.frames, recording_, sinks(), pipeline_options(config)) {}
+      pipeline_(sensor, config.method, config.frames, recording_, sinks(), pipeline_options(config)) {
+    open_results();
+}
 
 FrameSinks LiveSession::sinks() {
     return {.publish_pose = [this](PipelineFrame& frame) { publish_pose(frame); },
@@ -108,6 +102,20 @@ void LiveSession::report_clock_step() {
                                                 : "stays on the old scale, as it never goes back"));
 }
 
+/// Each session has a folder of its own: one that another sensor ended keeps its results.
+void LiveSession::open_results() {
+    if (config_.output.folder.empty()) return;
+    const std::string suffix = start_.sessions_before == 0 ? "" : fmt::format("-{}", start_.sessions_before + 1);
+    try {
+        writer_ = std::make_unique<ResultWriter>(config_.output.folder + suffix,
+                                                 static_cast<TimingClock>(config_.output.timing));
+    } catch (const OutputError& error) {
+        if (!start_.is_service) throw;
+        spdlog::error("{}; no result files are written", error.what());
+        ++output_failures_;
+    }
+}
+
 /// A service lives on when its disk is full.
 void LiveSession::write(PipelineFrame& frame) {
     if (!writer_) return;
@@ -117,6 +125,15 @@ void LiveSession::write(PipelineFrame& frame) {
         spdlog::error("{}; no more result files are written", error.what());
         ++output_failures_;
         writer_.reset();
+    }
+}
+
+void LiveSession::finish_results() {
+    try {
+        writer_->finish(pipeline_.map().points());
+    } catch (const OutputError& error) {
+        if (!start_.is_service) throw;
+        spdlog::error("{}; the result files are not complete", error.what());
     }
 }
 
@@ -183,7 +200,8 @@ void LiveSession::configure(const Config& config) {
 LiveStart LiveSession::next_start() const {
     return {.start_ns = start_.start_ns,
             .sessions_before = start_.sessions_before + 1,
-            .host_time = host_time_.for_another_sensor()};
+            .host_time = host_time_.for_another_sensor(),
+            .is_service = start_.is_service};
 }
 
 void LiveSession::log_health(const status_t& status) {
@@ -200,7 +218,7 @@ void LiveSession::finish() {
     pipeline_.rethrow_failure();
     if (writer_ || config_.saved_maps.at_stop) pipeline_.map().finish();
     if (config_.saved_maps.at_stop) save_last_map();
-    if (writer_) writer_->finish(pipeline_.map().points());
+    if (writer_) finish_results();
     spdlog::info("stopped after {} frames, {} dropped", pipeline_.finished_frames(), pipeline_.dropped_frames());
 }
 

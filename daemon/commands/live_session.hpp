@@ -27,12 +27,13 @@ struct LiveStart {
     std::int64_t start_ns = 0;          ///< CLOCK_MONOTONIC of the service's start
     std::uint64_t sessions_before = 0;  ///< each was ended by the sensor's becoming another one
     HostTimeFilter host_time = {};      ///< so that utime never goes back
+    bool is_service = false;            ///< goes on where result files cannot be written
 };
 
 class LiveSession {
   public:
     /// Opens sockets, LCM and files. @param metadata as the sensor gave it, for the recording
-    /// @throws driver::SourceError, MessageBusError, OutputError
+    /// @throws driver::SourceError, MessageBusError; OutputError where it is no service
     LiveSession(const Config& config, const driver::SensorInfo& sensor, const std::string& metadata,
                 const LiveStart& start);
 
@@ -57,7 +58,9 @@ class LiveSession {
   private:
     FrameSinks sinks();
     void publish_pose(PipelineFrame& frame);
+    void open_results();
     void write(PipelineFrame& frame);
+    void finish_results();
     void save_last_map();
     CounterList counters();
     void report_clock_step();
@@ -80,7 +83,7 @@ class LiveSession {
     RepeatedWarnings warnings_;
     ServiceNotifier service_;
     driver::Counter output_failures_;
-    std::int8_t last_health_ = -1;  ///< none yet: the first one is logged
+    std::int8_t last_health_ = -1;            ///< none yet: the first one is logged
     Pipeline pipeline_;                       // its threads use all of the above
     std::unique_ptr<RemoteControl> control_;  // last: its thread uses the pipeline
 };

@@ -3,6 +3,7 @@
 #include <systemd/sd-daemon.h>
 
 #include <algorithm>
+#include <cstdlib>
 
 namespace dlod::daemon {
 
@@ -16,6 +17,9 @@ std::string as_one_line(std::string text) {
 
 }  // namespace
 
+bool ServiceNotifier::is_service() const {
+    return std::getenv("NOTIFY_SOCKET") != nullptr;
+}
 void ServiceNotifier::ready(const std::string& status) const {
     ::sd_notifyf(0, "READY=1\nSTATUS=%s", as_one_line(status).c_str());
 }

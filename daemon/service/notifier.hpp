@@ -7,6 +7,8 @@ namespace dlod::daemon {
 
 class ServiceNotifier {
   public:
+    /// Somebody listens: systemd started this program, as a service.
+    bool is_service() const;
     void ready(const std::string& status) const;
     void status(const std::string& status) const;
     /// "Still alive". Call it only while the work moves on.

@@ -20,6 +20,7 @@ constexpr std::int64_t kLossMemory = 10 * kSecond;
 struct Loss {
     const char* counter;
     const char* remedy;
+    bool for_good = false;  ///< nothing makes it good again: it is not forgotten
 };
 constexpr Loss kLosses[] = {
     {"pipeline_dropped_frames", "the CPU is too slow: give the service more CPU or threads"},
@@ -31,6 +32,9 @@ constexpr Loss kLosses[] = {
     {"foreign_packets", "another sensor sends here: set sensor.sender, or give the right metadata"},
     {"implausible_packets", "damaged packets arrive"},
     {"lcm_failed", "LCM messages cannot be sent: check the multicast route"},
+    {"recording_write_failed", "packets cannot be recorded: check recording.folder and its disk"},
+    {"recording_buffer_full", "the disk is too slow for the recording"},
+    {"output_failures", "result files are no longer written: check output.folder and its disk", true},
 };
 
 std::int64_t resident_bytes() {
@@ -157,7 +161,7 @@ void StatusBoard::compose_health(std::int64_t last_packet_ns, std::int64_t now_n
     for (const Loss& loss : kLosses) {
         if (rise(loss.counter) > 0) rose_ns_[loss.counter] = now_ns;
         const auto rose = rose_ns_.find(loss.counter);
-        if (rose == rose_ns_.end() || now_ns - rose->second > kLossMemory) continue;
+        if (rose == rose_ns_.end() || (now_ns - rose->second > kLossMemory && !loss.for_good)) continue;
         losses += fmt::format("{}{}: {}", losses.empty() ? "" : "; ", loss.counter, loss.remedy);
     }
     if (!sensor_trouble_.empty()) losses += (losses.empty() ? "" : "; ") + sensor_trouble_;

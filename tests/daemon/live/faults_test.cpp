@@ -12,6 +12,7 @@
 #include "tests/daemon/live/live_run.hpp"
 #include "tests/support/fake_sensor.hpp"
 #include "tests/support/sanitizers.hpp"
+#include "tests/support/small_disk.hpp"
 
 namespace dlod {
 namespace {
@@ -135,6 +136,53 @@ TEST_F(Faults, DiskFullWhileRecordingAndWriting) {
     EXPECT_TRUE(run.log_says("no more result files are written"));
     EXPECT_TRUE(run.log_says("tried again every few seconds"));
     EXPECT_TRUE(run.poses_flow()) << "poses go on";
+    run.stop();
+}
+
+TEST_F(Faults, TheDiskIsFullAndHasRoomAgain) {
+    const test::SmallDisk disk(12 << 20);
+    if (!disk.usable()) GTEST_SKIP() << "no file system can be mounted here";
+    run.write_config("host: \"" + sensor->host() + "\"",
+                     "recording: {folder: " + (disk.path() / "recording").string() + "}\n");
+    run.start({"--out", (disk.path() / "out").string()});
+    EXPECT_TRUE(run.poses_flow());
+    disk.fill();
+    EXPECT_TRUE(run.log_says("No space left on device; no more result files are written", 15s));
+    EXPECT_TRUE(run.status_says([](const status_t& s) {
+        return s.health == status_t::DEGRADED && s.health_text.find("recording.folder") != std::string::npos &&
+               s.health_text.find("output.folder") != std::string::npos;
+    })) << "a planner and lcm-spy are told";
+    EXPECT_TRUE(run.poses_flow()) << "poses go on";
+    disk.clear();
+    EXPECT_TRUE(run.log_says("recording: goes on in", 20s));
+    run.stop();
+    for (const auto& entry : std::filesystem::directory_iterator(disk.path() / "recording")) {
+        if (entry.path().extension() != ".pcap") continue;
+        test::ChildProcess info({DLOD_BINARY, "info", entry.path().string()});
+        EXPECT_EQ(info.wait(20s), 0) << info.output();
+        EXPECT_EQ(info.output().find("warning"), std::string::npos) << info.output();
+    }
+}
+
+TEST_F(Faults, ResultFilesThatCannotBeMadeDoNotKeepAServiceFromItsWork) {
+    std::ofstream(run.folder.path() / "blocked") << "x";
+    run.start({"--out", (run.folder.path() / "blocked").string()});
+    EXPECT_TRUE(run.log_says("no result files are written"));
+    EXPECT_TRUE(run.poses_flow());
+    EXPECT_TRUE(
+        run.status_says([](const status_t& s) { return s.health_text.find("output.folder") != std::string::npos; }));
+    run.stop();
+}
+
+TEST_F(Faults, APortThatAnotherProgramHasIsAwaited) {
+    auto other = std::make_unique<test::ChildProcess>(
+        std::vector<std::string>{DLOD_BINARY, "run", "-c", run.config().string(), "--lcm", "none"});
+    for (int i = 0; i < 500 && other->output().find("receiving on port") == std::string::npos; ++i)
+        std::this_thread::sleep_for(20ms);
+    run.start();
+    EXPECT_TRUE(run.systemd.wait_for("is in use by another program", 10s)) << run.daemon->output();
+    other.reset();
+    EXPECT_TRUE(run.poses_flow()) << "no restart was needed";
     run.stop();
 }
 

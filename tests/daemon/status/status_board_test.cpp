@@ -80,6 +80,18 @@ TEST_F(StatusBoardTest, HealthSaysWhatIsWrongAndWhatToDo) {
     EXPECT_EQ(at(30.0, {{"packets_kernel_drops", 5}}, 20.0).health, status_t::WAITING);
 }
 
+TEST_F(StatusBoardTest, ResultFilesThatAreGivenUpAreNotForgotten) {
+    pose_at(2.0);
+    EXPECT_EQ(at(2.0, {{"output_failures", 1}, {"recording_write_failed", 3}}, 2.0).health, status_t::DEGRADED);
+    EXPECT_NE(board_.one_line().find("recording.folder"), std::string::npos) << board_.one_line();
+    for (int second = 3; second < 30; ++second) {
+        pose_at(second);
+        at(second, {{"output_failures", 1}, {"recording_write_failed", 3}}, second);
+    }
+    EXPECT_EQ(board_.one_line().find("recording.folder"), std::string::npos) << board_.one_line();
+    EXPECT_NE(board_.one_line().find("output.folder"), std::string::npos) << board_.one_line();
+}
+
 TEST_F(StatusBoardTest, PacketsThatHaveOnlyJustComeMayBeWithoutAPose) {
     EXPECT_EQ(at(60.0, {}, 0.0).health, status_t::WAITING) << "a sensor that boots slowly";
     EXPECT_EQ(at(61.0, {}, 61.0).health, status_t::OK) << board_.one_line();
