@@ -4,7 +4,8 @@
 #include <cctype>
 #include <fstream>
 #include <iterator>
-#include <system_error>
+
+#include "daemon/output/output_file.hpp"
 
 namespace dlod::daemon {
 
@@ -25,15 +26,13 @@ std::optional<std::string> MetadataCache::load() const {
 }
 
 std::optional<std::string> MetadataCache::store(const std::string& metadata) const {
-    auto temporary = path_;
-    temporary += ".new";
-    std::ofstream file(temporary, std::ios::binary | std::ios::trunc);
-    file << metadata;
-    file.close();
-    if (!file) return "cannot write " + temporary.string() + ": is the state directory there, writable and not full?";
-    std::error_code error;
-    std::filesystem::rename(temporary, path_, error);
-    if (error) return "cannot replace " + path_.string() + ": " + error.message();
+    try {
+        OutputFile file(path_, OutputFile::Mode::kReplace);
+        file.write(metadata);
+        file.close();
+    } catch (const OutputError& error) {
+        return error.what();
+    }
     return std::nullopt;
 }
 

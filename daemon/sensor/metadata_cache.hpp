@@ -14,7 +14,7 @@ class MetadataCache {
 
     std::optional<std::string> load() const;
 
-    /// Replaces the file in one step: a crash leaves the old or the new text, never half of one.
+    /// Replaces the file in one step: a crash or a loss of power leaves the old or the new text, never half of one.
     /// @return an error text that names the file, or nothing
     std::optional<std::string> store(const std::string& metadata) const;
 
