@@ -44,6 +44,11 @@ ExitCode doctor(const ConfigSources& sources) {
     // Room for an hour of results at 128 x 1024 and 10 Hz.
     constexpr std::uint64_t kResultBytes = 25'000'000'000;
     if (!config.output.folder.empty()) checks.push_back(check_disk(config.output.folder, kResultBytes));
+    if (!config.recording.folder.empty()) {
+        checks.push_back(check_disk(config.recording.folder,
+                                    std::uint64_t{1'000'000} * static_cast<std::uint64_t>(config.recording.files) *
+                                        static_cast<std::uint64_t>(config.recording.file_megabytes)));
+    }
     for (const Check& check : checks) {
         std::printf("%-8s %s: %s\n", word_for(check.verdict), check.name.c_str(), check.finding.c_str());
         if (!check.remedy.empty()) std::printf("         -> %s\n", check.remedy.c_str());

@@ -41,6 +41,25 @@ std::string megabytes(std::uint64_t bytes) {
     return std::to_string(bytes >> 20U) + " MiB";
 }
 
+std::filesystem::path nearest_existing(const std::filesystem::path& directory) {
+    std::error_code error;
+    std::filesystem::path path = std::filesystem::absolute(directory, error);
+    while (!std::filesystem::exists(path, error) && path.has_relative_path()) path = path.parent_path();
+    return path;
+}
+
+std::uint64_t bytes_of_files_in(const std::filesystem::path& directory) {
+    std::uint64_t bytes = 0;
+    std::error_code error;
+    for (std::filesystem::directory_iterator entry(directory, error), end; !error && entry != end;
+         entry.increment(error)) {
+        std::error_code gone;
+        const auto size = entry->file_size(gone);  // of what is no file: an error
+        if (!gone) bytes += size;
+    }
+    return bytes;
+}
+
 }  // namespace
 
 Check check_receive_buffer(int wanted_bytes) {
@@ -148,18 +167,23 @@ Check check_clock_synchronised() {
 
 Check check_disk(const std::filesystem::path& directory, std::uint64_t wanted_bytes) {
     Check check{"disk", Verdict::kGood, "", ""};
+    const std::filesystem::path there = nearest_existing(directory);
     struct statvfs space {};
-    if (::statvfs(directory.c_str(), &space) != 0) {
-        return {check.name, Verdict::kFailure, directory.string() + ": " + std::strerror(errno),
+    if (::statvfs(there.c_str(), &space) != 0) {
+        return {check.name, Verdict::kFailure, there.string() + ": " + std::strerror(errno),
                 "sudo mkdir -p " + directory.string()};
     }
-    if (::access(directory.c_str(), W_OK) != 0) {
-        return {check.name, Verdict::kFailure, directory.string() + " is not writable",
-                "sudo chown $USER " + directory.string() + " (the service has a directory of its own)"};
+    if (!std::filesystem::is_directory(there)) {
+        return {check.name, Verdict::kFailure, there.string() + " is no folder",
+                "name another folder than " + directory.string()};
+    }
+    if (::access(there.c_str(), W_OK) != 0) {
+        return {check.name, Verdict::kFailure, there.string() + " is not writable",
+                "sudo chown $USER " + there.string() + " (the service has a directory of its own)"};
     }
     const std::uint64_t free_bytes = static_cast<std::uint64_t>(space.f_bavail) * space.f_frsize;
-    check.finding = megabytes(free_bytes) + " free in " + directory.string();
-    if (free_bytes < wanted_bytes) {
+    check.finding = megabytes(free_bytes) + " free in " + there.string();
+    if (free_bytes + bytes_of_files_in(directory) < wanted_bytes) {
         check.verdict = Verdict::kWarning;
         check.remedy =
             "free at least " + megabytes(wanted_bytes) + " in " + directory.string() + ", or record fewer files";

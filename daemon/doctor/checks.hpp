@@ -36,7 +36,8 @@ Check check_locked_memory(bool configured);
 /// Is the host's clock disciplined by NTP or PTP?
 Check check_clock_synchronised();
 
-/// Are at least `wanted_bytes` free in `directory`, and may files be made there?
+/// Are at least `wanted_bytes` free in `directory`, what its files take included, and may files be made there? Where it
+/// is not there yet, dlod makes it: then the folder that it will be in is looked at.
 Check check_disk(const std::filesystem::path& directory, std::uint64_t wanted_bytes);
 
 /// Does the sensor answer over HTTP? An empty host is good: metadata come from a file then.

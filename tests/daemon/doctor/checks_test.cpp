@@ -4,6 +4,11 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "tests/support/small_disk.hpp"
+#include "tests/support/synthetic_capture.hpp"
 
 namespace dlod::daemon {
 namespace {
@@ -41,12 +46,26 @@ TEST(DoctorChecks, WhatIsNotConfiguredIsGood) {
 }
 
 TEST(DoctorChecks, DiskTellsMissingAndFull) {
-    EXPECT_EQ(check_disk("/nonexistent/state", 1).verdict, Verdict::kFailure);
-    const auto here = std::filesystem::temp_directory_path();
+    const test::TemporaryFolder folder;
+    const auto here = folder.path();
     EXPECT_EQ(check_disk(here, 1).verdict, Verdict::kGood);
+    const Check made = check_disk(here / "not/yet", 1);
+    EXPECT_EQ(made.verdict, Verdict::kGood) << "dlod makes it";
+    EXPECT_TRUE(made.finding.ends_with(here.string())) << made.finding;
+    std::ofstream(here / "file") << "x";
+    EXPECT_EQ(check_disk(here / "file" / "state", 1).verdict, Verdict::kFailure);
     const Check full = check_disk(here, UINT64_MAX);
     EXPECT_EQ(full.verdict, Verdict::kWarning);
     EXPECT_NE(full.remedy.find(here.string()), std::string::npos);
+}
+
+TEST(DoctorChecks, WhatAFolderHoldsAlreadyNeedsNoRoom) {
+    const test::SmallDisk disk(1'000'000);
+    if (!disk.usable()) GTEST_SKIP() << "no file system can be mounted here";
+    std::filesystem::create_directory(disk.path() / "recordings");
+    std::ofstream(disk.path() / "recordings" / "dlod_000001.pcap") << std::string(500'000, 'x');
+    EXPECT_EQ(check_disk(disk.path() / "recordings", 900'000).verdict, Verdict::kGood);
+    EXPECT_EQ(check_disk(disk.path() / "results", 900'000).verdict, Verdict::kWarning);
 }
 
 TEST(DoctorChecks, WithoutASensorNothingCanRun) {
