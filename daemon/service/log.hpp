@@ -8,7 +8,8 @@
 
 namespace dlod::daemon {
 
-/// Sends log messages of at least `level` (spdlog's numbers: 0 trace .. 6 off) to stderr; the journal adds the time.
+/// Sends log messages of at least `level` (spdlog's numbers: 0 trace .. 6 off) to stderr, to the journal with
+/// their priorities; it adds the time.
 void set_up_log(int level);
 
 /// Warnings that may come again and again: each kind is written at once, then at most once an interval with the number

@@ -1,6 +1,12 @@
 #include "daemon/service/log.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <spdlog/spdlog.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cstdlib>
 
 namespace dlod::daemon {
 namespace {
@@ -31,6 +37,25 @@ TEST(RepeatedWarnings, ThatAreEverOthersAreHeldBackToo) {
     }
     testing::internal::GetCapturedStderr();
     EXPECT_EQ(written, RepeatedWarnings::kMostKinds + 1);
+}
+
+TEST(Log, TheJournalIsToldThePriorities) {
+    testing::internal::CaptureStderr();
+    struct stat file {};
+    ASSERT_EQ(::fstat(STDERR_FILENO, &file), 0);
+    ::setenv("JOURNAL_STREAM", fmt::format("{}:{}", file.st_dev, file.st_ino).c_str(), 1);
+    spdlog::drop("dlod");
+    set_up_log(2);
+    spdlog::info("all is well");
+    spdlog::warn("a frame was dropped");
+    spdlog::error("the disk is full");
+    ::setenv("JOURNAL_STREAM", "1:1", 1);
+    spdlog::drop("dlod");
+    set_up_log(2);
+    spdlog::warn("by hand");
+    ::unsetenv("JOURNAL_STREAM");
+    EXPECT_EQ(testing::internal::GetCapturedStderr(),
+              "<6>info: all is well\n<4>warning: a frame was dropped\n<3>error: the disk is full\nwarning: by hand\n");
 }
 
 }  // namespace
