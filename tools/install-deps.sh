@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs what dlod needs to build, test and demonstrate itself on Debian 12.
 # usage: tools/install-deps.sh [--package] [--spy]
-#   --package   also what makes and checks the Debian package
+#   --package   also what makes and checks the Debian package (Java for the types' jar among it)
 #   --spy       also what lcm-spy needs (Java)
 # Does nothing, and needs neither network nor root, when everything is installed.
 set -euo pipefail
@@ -19,7 +19,7 @@ packages=(
 )
 for argument in "$@"; do
     case $argument in
-        --package) packages+=(dpkg-dev help2man lintian mmdebstrap) ;;
+        --package) packages+=(dpkg-dev help2man lintian mmdebstrap default-jdk-headless liblcm-java) ;;
         --spy) packages+=(default-jdk-headless default-jre liblcm-java libjchart2d-java) ;;
         *) sed -n '2,6s/^# //p' "$0"; exit 2 ;;
     esac

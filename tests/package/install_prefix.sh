@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # usage: install_prefix.sh BUILD_FOLDER
-# `cmake --install --prefix` into an empty folder: programs start, units name them, and a project outside of dlod finds the
-# message types and links with them. 77: skipped.
+# `cmake --install --prefix` into an empty folder: programs start, units name them, completion and manual pages are
+# whole, and a project outside of dlod finds the message types and links with them. 77: skipped.
 set -euo pipefail
 prefix=$(mktemp -d)
 trap 'rm -rf "$prefix"' EXIT
@@ -22,13 +22,16 @@ if [[ -d $prefix/opt/share/man ]]; then
     done
 fi
 
+"$(dirname "$0")/completion.sh" "$prefix/opt"
+
 jar=$prefix/opt/share/dlod/dlod_types.jar
 if [[ -f $jar ]]; then
     classes=$(jar tf "$jar")
-    for type in "$prefix"/opt/share/dlod/lcmtypes/dlod_*.lcm; do
-        type=$(basename "$type" .lcm)
-        grep -Fqx "dlod/${type#dlod_}.class" <<<"$classes"
-    done
+    while read -r file; do
+        package=$(sed -n 's/^package \(.*\);.*/\1/p' "$file")
+        type=$(basename "$file" .lcm)
+        grep -Fqx "$package/${type#"$package"_}.class" <<<"$classes"
+    done < <(find "$prefix/opt/share/dlod/lcmtypes" -name '*.lcm')
     echo "the jar for dlod-spy has all types"
 fi
 
