@@ -91,6 +91,16 @@ Lidar::Lidar(const driver::SensorInfo& sensor, const World& world, double durati
     }
 }
 
+/// A direction moved by the offset of its pulse.
+Eigen::Vector3d Lidar::off_grid(const Eigen::Vector3d& direction, int index, int measurement, int row) const {
+    Random random(options_.seed ^ 0x0FF6, static_cast<std::uint64_t>(index),
+                  static_cast<std::uint64_t>(measurement) * 256U + static_cast<std::uint64_t>(row));
+    const double azimuth = options_.off_grid_rad * (2.0 * random.uniform() - 1.0);
+    const double altitude = options_.off_grid_rad * (2.0 * random.uniform() - 1.0);
+    const Vec3 left = Vec3::UnitZ().cross(direction).normalized();
+    return (direction + azimuth * left + altitude * direction.cross(left)).normalized();
+}
+
 void Lidar::measure(const Hit* hits, Random& random, Echo& first, Echo& second) const {
     static_assert(kShare.size() == kSubRays);
     // Energies of the beam's parts, nearest first.
@@ -247,10 +257,9 @@ void Lidar::scan(int index, RayCaster& caster, Scan& scan) const {
             const int beams = std::min(beams_a_cast, H - row);
             for (int i = 0; i < kRaysPerCast; ++i) {
                 const int beam = std::min(row + i / rays_a_beam_, H - 1);
-                rays.direction[i] =
-                    (turn *
-                     beams_[static_cast<std::size_t>(beam)].direction[static_cast<std::size_t>(i % rays_a_beam_)])
-                        .cast<float>();
+                Vec3 d = beams_[static_cast<std::size_t>(beam)].direction[static_cast<std::size_t>(i % rays_a_beam_)];
+                if (options_.off_grid_rad > 0.0) d = off_grid(d, index, m, beam);
+                rays.direction[i] = (turn * d).cast<float>();
             }
             caster.cast(rays, hits.data());
             if (options_.rough) {

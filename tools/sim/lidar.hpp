@@ -27,6 +27,8 @@ struct LidarOptions {
     std::uint64_t seed = 1;
     bool noise = true;   ///< false: exact ranges, no dropouts, beams without width
     bool rough = false;  ///< leaves let light through and flutter, beams are not quite calibrated, stray returns
+    /// Single pulses are off from their pixel's direction by up to this, in azimuth and altitude.
+    double off_grid_rad = 0.0;
 };
 
 /// One return of each pixel; destaggered images.
@@ -68,6 +70,7 @@ class Lidar {
         std::array<Eigen::Vector3d, kSubRays> direction;  ///< in the lidar frame at encoder angle 0
     };
     struct Echo;
+    Eigen::Vector3d off_grid(const Eigen::Vector3d& direction, int index, int measurement, int row) const;
     void pass_leaves(const RayCaster& caster, const RayBundle& rays, Random& random, Hit hits[kRaysPerCast]) const;
     void measure(const Hit* hits, Random& random, Echo& first, Echo& second) const;
     void scatter(Random& random, Echo& echo) const;

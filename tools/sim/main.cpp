@@ -44,6 +44,7 @@ struct Options {
     int frames = 0;
     bool no_noise = false;
     bool rough = false;
+    double off_grid_mrad = 0.0;
     bool start_moving = false;
     bool no_wobble = false;
     bool fragments = false;
@@ -149,6 +150,11 @@ void add_options(CLI::App& app, Options& o) {
                  "as outdoors: leaves let beams through and flutter, beams are off from their calibration by some "
                  "millimetres and hundredths of a degree, stray returns")
         ->excludes("--no-noise");
+    app.add_option(
+           "--off-grid", o.off_grid_mrad,
+           "as a recording of another lidar that was put into an Ouster's grid: single points are off from their "
+           "pixel's direction by up to this, in azimuth and altitude, mrad")
+        ->check(CLI::Range(0.0, 20.0));
     app.add_flag("--fragments", o.fragments, "the capture holds IPv4 fragments instead of jumbo frames");
 
     app.add_option("--loss", o.faults.loss, "share of the lidar packets that are lost")->check(CLI::Range(0.0, 1.0));
@@ -223,8 +229,9 @@ int run(Options& o) {
     const auto began = std::chrono::steady_clock::now();
     const auto scene = std::find_if(scenes().begin(), scenes().end(), [&](const auto& s) { return s.name == o.scene; });
     const World world = scene->build(o.world);
-    const Lidar lidar(sensor, world, o.world.duration_s,
-                      {.seed = o.world.seed, .noise = !o.no_noise, .rough = o.rough});
+    const Lidar lidar(
+        sensor, world, o.world.duration_s,
+        {.seed = o.world.seed, .noise = !o.no_noise, .rough = o.rough, .off_grid_rad = 1e-3 * o.off_grid_mrad});
     const ImuSimulator imu(world.robot, sensor.model, o.world.seed, !o.no_noise);
     PacketStream stream(sensor, imu, o.world.duration_s, o.world.seed, o.faults);
 
@@ -266,6 +273,7 @@ int run(Options& o) {
                        .faults = describe(o.faults),
                        .noise = !o.no_noise,
                        .rough = o.rough,
+                       .off_grid_mrad = o.off_grid_mrad,
                        .fragments = o.fragments});
     }
     if (pcap && !pcap->flush()) throw std::runtime_error(pcap->error());

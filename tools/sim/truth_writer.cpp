@@ -203,6 +203,7 @@ void TruthWriter::finish(const ImuSimulator& imu, double duration_s, const Drive
                         {"profile", drive.profile},
                         {"noise", drive.noise},
                         {"rough", drive.rough},
+                        {"off_grid_mrad", drive.off_grid_mrad},
                         {"motion_distortion", true},
                         {"fragment", drive.fragments},
                         {"faults", nlohmann::json::parse(drive.faults)},

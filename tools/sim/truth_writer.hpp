@@ -23,6 +23,7 @@ struct DriveDescription {
     std::string faults;  ///< JSON object
     bool noise = true;
     bool rough = false;
+    double off_grid_mrad = 0.0;
     bool fragments = false;
 };
 

@@ -169,6 +169,36 @@ TEST(Drive, RoughMeasurementsAreOffByTheBeamAndScatteredByLeaves) {
     EXPECT_GT(changes(rough), 3 * changes(smooth) + 20);
 }
 
+// Even ground at a given altitude: a pulse that is off by an angle is off in range by that times range / tan(altitude).
+TEST(Drive, PulsesOffTheGridMissTheirPixelsDirection) {
+    DriveSettings settings;
+    settings.world.movers = false;
+    settings.world.duration_s = 0.3;
+    settings.world.robot = {.speed_mps = 0.0, .wobble = false};
+    const auto median_change_m = [](const RecordedDrive& drive) {
+        const auto& a = drive.scans[0].first.range_mm;
+        const auto& b = drive.scans[1].first.range_mm;
+        std::vector<double> change_m;
+        for (int c = 0; c < a.width(); ++c) {
+            const int row = a.height() - 1;
+            if (a(row, c) != 0 && b(row, c) != 0)
+                change_m.push_back(std::abs(static_cast<double>(a(row, c)) - static_cast<double>(b(row, c))) * 1e-3);
+        }
+        const auto middle = change_m.begin() + static_cast<std::ptrdiff_t>(change_m.size() / 2);
+        std::nth_element(change_m.begin(), middle, change_m.end());
+        return *middle;
+    };
+    const RecordedDrive on_grid = record(settings);
+    settings.off_grid_rad = 0.005;
+    const RecordedDrive off_grid = record(settings);
+    const double altitude = std::abs(static_cast<double>(on_grid.sensor.model.altitude_rad.back()));
+    const double range_m = 1.2 / std::sin(altitude);
+    // Of the difference of two evenly spread errors half are below .59 of the largest of one.
+    const double expected_m = 0.59 * settings.off_grid_rad * range_m / std::tan(altitude);
+    EXPECT_LT(median_change_m(on_grid), 0.5 * expected_m);
+    EXPECT_NEAR(median_change_m(off_grid), expected_m, 0.25 * expected_m);
+}
+
 TEST(Drive, NobodyIsThereWithoutMovers) {
     DriveSettings settings;
     settings.world.movers = false;

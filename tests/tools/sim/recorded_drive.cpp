@@ -14,7 +14,8 @@ RecordedDrive record(const DriveSettings& s) {
     const auto scene = std::find_if(scenes().begin(), scenes().end(), [&](const auto& i) { return i.name == s.scene; });
     drive.world = scene->build(s.world);
     const double duration = s.world.duration_s;
-    const Lidar lidar(drive.sensor, drive.world, duration, {.seed = s.world.seed, .noise = s.noise, .rough = s.rough});
+    const Lidar lidar(drive.sensor, drive.world, duration,
+                      {.seed = s.world.seed, .noise = s.noise, .rough = s.rough, .off_grid_rad = s.off_grid_rad});
     const ImuSimulator imu(drive.world.robot, drive.sensor.model, s.world.seed, s.noise);
     PacketStream stream(drive.sensor, imu, duration, s.world.seed, s.faults);
     const int turns = static_cast<int>(std::lround(duration / drive.sensor.model.frame_period_s));

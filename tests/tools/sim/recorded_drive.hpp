@@ -20,6 +20,7 @@ struct DriveSettings {
     std::string profile = "RNG19_RFL8_SIG16_NIR16";
     bool noise = true;
     bool rough = false;
+    double off_grid_rad = 0.0;
     int threads = 2;
     FaultOptions faults;
 };
