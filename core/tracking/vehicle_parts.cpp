@@ -10,7 +10,7 @@ namespace dlod {
 
 namespace {
 
-constexpr int kKnownHits = 5;          // an extent that can be relied upon
+constexpr int kKnownHits = 5;           // an extent that can be relied upon
 constexpr double kRestSize = 1.2;       // the rest of an object is at most so many times as large as it was
 constexpr double kSameVehicle_m = 0.3;  // a vehicle's parts together are no larger than that beyond what is known
 constexpr double kMargin_m = 0.4;       // of a piece's place in a vehicle's box
