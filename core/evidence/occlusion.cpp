@@ -4,6 +4,24 @@
 
 namespace dlod {
 
+namespace {
+
+/// Of the pixels at the begin that follow each other.
+std::size_t run_length(std::span<const PixelIndex> pixels) {
+    constexpr std::size_t kBlock = 8;
+    std::size_t n = 1;
+    while (n + kBlock <= pixels.size()) {
+        PixelIndex off = 0;
+        for (std::size_t k = 0; k < kBlock; ++k) off |= pixels[n + k] ^ (pixels[0] + static_cast<PixelIndex>(n + k));
+        if (off != 0) break;
+        n += kBlock;
+    }
+    while (n < pixels.size() && pixels[n] == pixels[n - 1] + 1) ++n;
+    return n;
+}
+
+}  // namespace
+
 void mark_occlusion(std::span<const PixelIndex> pixels, const Image<float>& range_m, double min_step_m,
                     std::span<int> row_ends, Detection& detection) {
     detection.occluded_left = false;
@@ -15,25 +33,28 @@ void mark_occlusion(std::span<const PixelIndex> pixels, const Image<float>& rang
     const int reference = static_cast<int>(pixels.front()) % width;
     std::span<int> left = row_ends.first(static_cast<std::size_t>(height));
     std::span<int> right = row_ends.subspan(static_cast<std::size_t>(height), static_cast<std::size_t>(height));
-    const auto [first, last] = std::minmax_element(pixels.begin(), pixels.end());
-    const int top = static_cast<int>(*first) / width;
-    const int bottom = static_cast<int>(*last) / width;
-    std::fill(left.begin() + top, left.begin() + bottom + 1, width);
-    std::fill(right.begin() + top, right.begin() + bottom + 1, -width);
-    std::size_t at = 0;  // the row at hand
-    int row_begin = -width;
-    for (const PixelIndex pixel : pixels) {
-        const auto p = static_cast<int>(pixel);
-        // Pixels of a row mostly follow each other.
-        if (p < row_begin || p >= row_begin + width) {
-            at = static_cast<std::size_t>(p / width);
-            row_begin = p / width * width;
-        }
-        int column = p - row_begin - reference;
-        if (column >= width / 2) column -= width;
-        if (column < -width / 2) column += width;
-        left[at] = std::min(left[at], column);
-        right[at] = std::max(right[at], column);
+    std::fill(left.begin(), left.end(), width);
+    std::fill(right.begin(), right.end(), -width);
+    int top = height;
+    int bottom = -1;
+    for (std::size_t i = 0; i < pixels.size();) {
+        const auto p = static_cast<int>(pixels[i]);
+        const int row = p / width;
+        int first = p - row * width;
+        const std::size_t run =
+            run_length(pixels.subspan(i, std::min(pixels.size() - i, static_cast<std::size_t>(width - first))));
+        i += run;
+        first -= reference;
+        if (first >= width / 2) first -= width;
+        if (first < -width / 2) first += width;
+        const int last = first + static_cast<int>(run) - 1;
+        // The run passes the column opposite to the first pixel: it reaches both ends.
+        const bool around = last > (width - 1) / 2;
+        const auto at = static_cast<std::size_t>(row);
+        left[at] = std::min(left[at], around ? -width / 2 : first);
+        right[at] = std::max(right[at], around ? (width - 1) / 2 : last);
+        top = std::min(top, row);
+        bottom = std::max(bottom, row);
     }
     constexpr int kReach = 3;  // columns beyond the end in which the neighbour's return is looked for
     const auto step = static_cast<float>(min_step_m);
