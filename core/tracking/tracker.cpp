@@ -26,6 +26,7 @@ constexpr double kInside = 0.6;            // of its footprint lies inside of th
 constexpr double kInsideVehicle = 0.8;     // or of a moving vehicle's box itself
 constexpr double kSimilar = 1.5;           // ratio of footprint diagonals
 constexpr int kYoungHits = 10;
+constexpr double kBody_m = 1.2;           // people are no broader
 constexpr double kFree = 0.5;             // evidence of a part that stands where it was free
 constexpr double kStackedOverlap = 0.25;  // share of the smaller height that two halves of one object have in common
 constexpr double kStackedShift_m = 0.4;   // and between their middles in the ground plane
@@ -231,6 +232,12 @@ void Tracker::State::join_pieces(Frame& frame) {
 // tracks that stand on top of one another and the smaller of two that are pieces of one vehicle.
 void Tracker::State::attach_parts(Frame& frame) {
     const auto& detections = frame.detection.detections;
+    // A body that moves, seen by itself, is no part of what has not been seen to.
+    const auto passes_by = [&](std::size_t body, std::size_t other) {
+        const OrientedBox& box = detections[body].box;
+        return candidates[body].motion > kFree && candidates[other].motion <= 0.0 &&
+               box.longest_m() < std::min(kBody_m, box.size_m.z());
+    };
     limb.assign(detections.size(), 0);
     hosts.clear();
     for (std::size_t d = 0; d < detections.size(); ++d) {
@@ -261,6 +268,7 @@ void Tracker::State::attach_parts(Frame& frame) {
                                sets_off_with(host, detections[other], detections[d]));
             const bool covered = host.drives() && share_inside(detections[d].box, box, 0.0) > kInsideVehicle;
             if (!rest && !covered && candidates[d].motion * expected[t].motion < -0.2) continue;
+            if (!rest && !covered && host.state() != DynamicState::kDynamic && passes_by(d, other)) continue;
             if (height_gap_m(box, detections[d].box) > kMaxGap_m) continue;
             double reach = rest ? kLimbMargin_m : kPartMargin_m;
             if (guest != nullptr) {

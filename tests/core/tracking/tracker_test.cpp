@@ -266,6 +266,39 @@ TEST_F(TrackerTest, SplitPartsJoinTheirTrack) {
     EXPECT_EQ(scene.frame.detection.tracks[0].points, 100);
 }
 
+// Two walls of a house that has just come into view: the box of what is undecided holds the pavement, too.
+TEST_F(TrackerTest, AWalkerIsNoPartOfAHouseThatHePasses) {
+    Tracker tracker(sensor, config);
+    for (int k = 0; k < 12; ++k) {
+        scene.next();
+        std::vector<PixelIndex> house;
+        for (int i = 0; i < 8; ++i) {
+            for (const auto& [x, y] : {std::pair{5.0 + i, 5.0}, std::pair{12.5, 2.0 + 0.4 * i}}) {
+                Cylinder wall = person(x, y);
+                wall.moving = false;
+                wall.radius_m = 0.5;
+                const auto part = scene.place(wall);
+                house.insert(house.end(), part.begin(), part.end());
+            }
+        }
+        Detection& undecided = scene.detect(house, false);
+        undecided.unknown_points = undecided.occupied_points;
+        undecided.occupied_points = 0;
+        undecided.average_residual_m = 1.0;
+        const double x = 9.5 - 0.13 * k;
+        if (k >= 4) scene.add(person(x, 3.5));
+        tracker.process(scene.frame);
+        if (k < 6) continue;
+        const auto& detections = scene.frame.detection.detections;
+        EXPECT_NE(detections[0].track, detections[1].track) << k;
+        const Track& walker = scene.frame.detection.tracks[static_cast<std::size_t>(detections[1].track)];
+        EXPECT_EQ(walker.state, DynamicState::kDynamic) << k;
+        EXPECT_LT(walker.box.longest_m(), 1.0) << k;
+        const Track& walls = scene.frame.detection.tracks[static_cast<std::size_t>(detections[0].track)];
+        EXPECT_NE(walls.state, DynamicState::kDynamic) << k;
+    }
+}
+
 // Evidence divides a slow object: part of it stands where it was, part where it was not.
 TEST_F(TrackerTest, TheRestOfADividedObjectStaysPartOfIt) {
     Tracker tracker(sensor, config);
