@@ -20,7 +20,7 @@ step() { printf '\n== %s (%d s since the start)\n' "$*" "$SECONDS"; }
 jobs=$(tools/build-jobs.sh)
 
 step "configure and build (Release), $jobs jobs"
-cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DDLOD_BUILD_BENCHMARKS=ON
+cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DDLOD_BUILD_TESTS=ON -DDLOD_BUILD_BENCHMARKS=ON
 cmake --build build -j "$jobs"
 step "tests"
 ctest --test-dir build -j 2 --output-on-failure "$@"
