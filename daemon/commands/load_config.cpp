@@ -1,6 +1,8 @@
 #include "daemon/commands/load_config.hpp"
 
 #include "daemon/config/config_file.hpp"
+#include "daemon/config/consistency.hpp"
+#include "daemon/config/option.hpp"
 #include "daemon/config/presets.hpp"
 
 namespace dlod::daemon {
@@ -12,7 +14,12 @@ Config load_config(const ConfigSources& sources, const driver::SensorInfo* senso
     }
     if (sources.file) apply_file(config, *sources.file);
     for (const auto& setting : sources.settings) apply_setting(config, setting);
-    check_consistency(config);
+    try {
+        check_consistency(config);
+    } catch (const ConfigError& error) {
+        if (!sources.file) throw;
+        throw ConfigError(sources.file->string() + ": " + error.what());
+    }
     return config;
 }
 

@@ -4,7 +4,6 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <cmath>
 #include <fstream>
 #include <set>
 #include <sstream>
@@ -104,24 +103,6 @@ std::string comment(const std::string& text, const std::string& indent) {
     return out + line + '\n';
 }
 
-void check_robot_body(const RobotBodyConfig& body) {
-    if (body.boxes_m.size() % 6 != 0) {
-        throw ConfigError(
-            fmt::format("robot_body.boxes_m: it has {} numbers; a box has six: lowest x, y, z, highest "
-                        "x, y, z",
-                        body.boxes_m.size()));
-    }
-    const auto boxes = body.boxes();
-    for (std::size_t i = 0; i < boxes.size(); ++i) {
-        if (!(boxes[i].low_m.array() < boxes[i].high_m.array()).all()) {
-            throw ConfigError(
-                fmt::format("robot_body.boxes_m: box {}: its lowest corner must lie below its highest "
-                            "one in x, y and z",
-                            i + 1));
-        }
-    }
-}
-
 }  // namespace
 
 void apply_yaml(Config& config, const std::string& yaml, const std::string& name) {
@@ -166,22 +147,6 @@ void apply_setting(Config& config, const std::string& setting) {
             throw ConfigError("not a list; write [a, b, ...]");
         }
     });
-}
-
-void check_consistency(const Config& config) {
-    const auto& q = config.extrinsics.rotation_wxyz;
-    const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    if (std::abs(norm - 1.0) > 1e-3) {
-        throw ConfigError(fmt::format("extrinsics.rotation_wxyz: its norm is {:.6g}, a unit quaternion's is 1", norm));
-    }
-    if (config.sensor.lidar_port != 0 && config.sensor.lidar_port == config.sensor.imu_port) {
-        throw ConfigError("sensor.imu_port: must differ from sensor.lidar_port");
-    }
-    check_robot_body(config.robot_body);
-    const auto& obstacles = config.lcm.obstacles;
-    if (obstacles.min_height_m >= obstacles.max_height_m) {
-        throw ConfigError("lcm.obstacles.min_height_m: must be below lcm.obstacles.max_height_m");
-    }
 }
 
 std::string to_yaml(const Config& config) {

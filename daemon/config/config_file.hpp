@@ -24,9 +24,6 @@ void apply_file(Config& config, const std::filesystem::path& file);
 /// Applies one "key=value". @throws ConfigError
 void apply_setting(Config& config, const std::string& setting);
 
-/// Checks what no single range can. @throws ConfigError
-void check_consistency(const Config& config);
-
 /// The whole configuration as commented YAML, in the order of declaration; values are those of `config`, the defaults
 /// in the comments those of the program.
 std::string to_yaml(const Config& config);

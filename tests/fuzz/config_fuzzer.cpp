@@ -6,6 +6,7 @@
 
 #include "daemon/config/config.hpp"
 #include "daemon/config/config_file.hpp"
+#include "daemon/config/consistency.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace dlod::daemon;

@@ -110,6 +110,8 @@ TEST_F(CommandsTest, ConfigurationErrorsNameTheKey) {
     EXPECT_TRUE(ends(dlod({"replay", capture_, "--set", "odometry.use_imu=perhaps"}), 3, {"odometry.use_imu"}));
     EXPECT_TRUE(ends(dlod({"replay", capture_, "--threads", "0"}), 3, {"pipeline.threads"}));
     EXPECT_TRUE(ends(dlod({"check-config", write("good.yaml", "odometry: {use_imu: off}\n")}), 0, {"valid"}));
+    EXPECT_TRUE(ends(dlod({"check-config", write("group.yaml", "sensor: {multicast_group: eth0}\n")}), 3,
+                     {"group.yaml", "sensor.multicast_group"}));
     EXPECT_TRUE(ends(dlod({"run"}), 3, {"sensor.metadata"}));
 }
 

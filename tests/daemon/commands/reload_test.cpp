@@ -23,8 +23,9 @@ class ReloadTest : public testing::Test {
 };
 
 TEST_F(ReloadTest, WhatCanChangeChangesAndTheRestIsNamed) {
+    running_.sensor.host = "os-1";
     const Reload result = reload_from(
-        "log: {level: debug}\nsensor: {sender: 10.0.0.2, configure: {lidar_mode: 1024x10}}\n"
+        "log: {level: debug}\nsensor: {sender: 10.0.0.2, host: os-1, configure: {lidar_mode: 1024x10}}\n"
         "recording: {folder: r, files: 3}\npipeline: {threads: 3}\ntracking: {association: {alpha: 0.25}}\n");
     EXPECT_EQ(result.error, "");
     EXPECT_EQ(result.changed,

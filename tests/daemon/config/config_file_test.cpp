@@ -116,16 +116,6 @@ TEST(ConfigFile, SettingsAreCheckedLikeFiles) {
     EXPECT_TRUE(has(error_of_setting("extrinsics.translation_m=[1, 2"), {"extrinsics.translation_m"}));
 }
 
-TEST(ConfigFile, ContradictionsAreErrors) {
-    Config config;
-    EXPECT_NO_THROW(check_consistency(config));
-    config.extrinsics.rotation_wxyz = {1.0, 1.0, 0.0, 0.0};
-    EXPECT_THROW(check_consistency(config), ConfigError);
-    config = {};
-    config.sensor.lidar_port = config.sensor.imu_port = 7000;
-    EXPECT_THROW(check_consistency(config), ConfigError);
-}
-
 TEST(ConfigFile, WhatIsPrintedIsReadBack) {
     Config config;
     apply_setting(config, "pipeline.threads=7");
