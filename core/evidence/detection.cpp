@@ -122,12 +122,10 @@ void Detector::State::add(Frame& frame, std::size_t segment, std::span<const Pix
     detection.count = static_cast<std::uint32_t>(pixels.size());
     result.pixels.insert(result.pixels.end(), pixels.begin(), pixels.end());
     if (!config.use_free_space) return;
-    for (const PixelIndex pixel : pixels) {
-        const Evidence e = evidence[pixel];
-        detection.free_points += e == Evidence::kFree ? 1 : 0;
-        detection.occupied_points += e == Evidence::kOccupied ? 1 : 0;
-        detection.unknown_points += e == Evidence::kUnknown ? 1 : 0;
-    }
+    const EvidenceImage::Counts counted = evidence.count(pixels);
+    detection.free_points = counted.free;
+    detection.occupied_points = counted.occupied;
+    detection.unknown_points = counted.unknown;
 }
 
 /// Completes what may be moving and measures what needs the whole mask.

@@ -1,6 +1,7 @@
 #include "core/evidence/evidence_image.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace dlod {
@@ -83,6 +84,19 @@ void EvidenceImage::sort_into_blocks(const OdometryResult& odometry) {
         points_.y[i] = odometry.y[pixel];
         points_.z[i] = odometry.z[pixel];
     }
+}
+
+EvidenceImage::Counts EvidenceImage::count(std::span<const PixelIndex> pixels) const {
+    // Three counters side by side in one word: an image has fewer than two million pixels.
+    constexpr int kBits = 21;
+    constexpr std::uint64_t kOne = 1, kMask = (kOne << kBits) - 1;
+    constexpr std::array<std::uint64_t, 4> kAdd{0, kOne, kOne << kBits, kOne << (2 * kBits)};
+    static_assert(static_cast<int>(Evidence::kUnknown) == 1 && static_cast<int>(Evidence::kFree) == 2 &&
+                  static_cast<int>(Evidence::kOccupied) == 3);
+    std::uint64_t sum = 0;
+    for (const PixelIndex pixel : pixels) sum += kAdd[image_[pixel]];
+    return {static_cast<int>(sum >> kBits & kMask), static_cast<int>(sum >> (2 * kBits)),
+            static_cast<int>(sum & kMask)};
 }
 
 void EvidenceImage::run(const Frame& frame) {

@@ -26,6 +26,11 @@ class EvidenceImage {
     void forget() { references_.clear(); }
 
     Evidence operator[](PixelIndex pixel) const { return static_cast<Evidence>(image_[pixel]); }
+    /// Tested pixels by what they say.
+    struct Counts {
+        int free = 0, occupied = 0, unknown = 0;
+    };
+    Counts count(std::span<const PixelIndex> pixels) const;
     void set(PixelIndex pixel, Evidence evidence) { image_[pixel] = static_cast<std::uint8_t>(evidence); }
     /// Pixels tested by the last run().
     std::span<const PixelIndex> tested() const { return points_.pixel; }
