@@ -120,6 +120,8 @@ GroundRemoval::GroundRemoval(const SensorModel& sensor, const GroundRemovalConfi
     }
     const double span = std::max(0.0, config.max_sensor_height_m - config.min_sensor_height_m);
     histogram_.assign(static_cast<std::size_t>(span / kHistogramBin_m) + 2, 0);
+    around_.reserve(static_cast<std::size_t>(sampled_distance_.width()) *
+                    static_cast<std::size_t>((sensor.height + kRowStep - 1) / kRowStep));
 }
 
 void GroundRemoval::update_gravity(const Frame& frame) {
@@ -140,6 +142,15 @@ void GroundRemoval::update_up(const Frame& frame) {
     const Eigen::Vector3f front = up_.cross(side);
     const auto farthest = kAround * static_cast<float>(sensor_height_m_);
     const StructuredCloud& cloud = frame.cloud;
+    around_.clear();
+    for (int r = sensor_.height - 1; r >= 0; r -= kRowStep) {
+        for (int c = 0; c < sensor_.width; c += kColumnStep) {
+            if (frame.prepared.ground(r, c) == 0 || cloud.range_m(r, c) > 2.0F * farthest) continue;
+            const Eigen::Vector3f p(cloud.x(r, c), cloud.y(r, c), cloud.z(r, c));
+            const Eigen::Vector3f q(side.dot(p), front.dot(p), up_.dot(p));
+            if (q.head<2>().squaredNorm() <= farthest * farthest) around_.push_back(q);
+        }
+    }
     // Twice: the second time without what does not lie in the first plane, kerbs and feet.
     Eigen::Vector3f plane(0.0F, 0.0F, static_cast<float>(-sensor_height_m_));
     int used = 0;
@@ -147,19 +158,12 @@ void GroundRemoval::update_up(const Frame& frame) {
         Eigen::Matrix3f A = Eigen::Matrix3f::Zero();
         Eigen::Vector3f b = Eigen::Vector3f::Zero();
         used = 0;
-        for (int r = sensor_.height - 1; r >= 0; r -= kRowStep) {
-            for (int c = 0; c < sensor_.width; c += kColumnStep) {
-                if (frame.prepared.ground(r, c) == 0 || cloud.range_m(r, c) > 2.0F * farthest) continue;
-                const Eigen::Vector3f p(cloud.x(r, c), cloud.y(r, c), cloud.z(r, c));
-                const Eigen::Vector3f row(side.dot(p), front.dot(p), 1.0F);
-                const float height = up_.dot(p);
-                if (row.head<2>().squaredNorm() > farthest * farthest ||
-                    std::abs(height - plane.dot(row)) > kAroundTolerance_m + slope * row.head<2>().norm())
-                    continue;
-                A += row * row.transpose();
-                b += row * height;
-                ++used;
-            }
+        for (const Eigen::Vector3f& q : around_) {
+            const Eigen::Vector3f row(q.x(), q.y(), 1.0F);
+            if (std::abs(q.z() - plane.dot(row)) > kAroundTolerance_m + slope * row.head<2>().norm()) continue;
+            A += row * row.transpose();
+            b += row * q.z();
+            ++used;
         }
         if (used < kFewestAround) break;
         plane = (A + 1e-3F * Eigen::Matrix3f::Identity()).ldlt().solve(b);

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
 #include "core/types/frame.hpp"
 #include "core/types/parameter.hpp"
@@ -77,6 +78,7 @@ class GroundRemoval {
     AlignedVector<float> wall_rise_;  ///< [H] difference of the beams' tangents to the row that slopes are taken to
     Image<float> sampled_distance_, sampled_height_;  ///< likewise of every few columns, [kRows]
     AlignedVector<int> histogram_;
+    std::vector<Eigen::Vector3f> around_;  ///< sample of the ground around: two level axes and along up_
 };
 
 }  // namespace dlod

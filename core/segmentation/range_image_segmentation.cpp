@@ -151,7 +151,7 @@ void RangeImageSegmentation::collect(Preparation& prepared, const StructuredClou
     for (std::size_t s = 0; s < growing_.size(); ++s) growing_[s].next_pixel = prepared.segments[s].first;
     for (int r = 0; r < sensor_.height; ++r) {
         std::uint32_t* labels = prepared.segment.row(r);
-        std::fill_n(labels, sensor_.width, 0U);
+        std::size_t written = 0;
         const auto begin = static_cast<std::size_t>(r) * static_cast<std::size_t>(sensor_.width);
         const auto row = static_cast<std::size_t>(r);
         for (std::uint32_t i = row_begin_[row]; i < row_begin_[row + 1]; ++i) {
@@ -163,7 +163,9 @@ void RangeImageSegmentation::collect(Preparation& prepared, const StructuredClou
                 ++segment.rows;
             }
             const std::size_t count = static_cast<std::size_t>(last_[i] - first_[i]) + 1;
+            std::fill(labels + written, labels + first_[i], 0U);
             std::fill_n(labels + first_[i], count, label);
+            written = static_cast<std::size_t>(last_[i]) + 1;
             PixelIndex* pixels = &prepared.pixels[segment.next_pixel];
             std::iota(pixels, pixels + count, static_cast<PixelIndex>(begin + first_[i]));
             segment.next_pixel += static_cast<std::uint32_t>(count);
@@ -175,6 +177,7 @@ void RangeImageSegmentation::collect(Preparation& prepared, const StructuredClou
             segment.too_large = is_too_large(segment.bounds.height(), segment.bounds.length(), segment.bounds.high[3],
                                              config_.feasibility);
         }
+        std::fill(labels + written, labels + sensor_.width, 0U);
     }
     for (std::size_t s = 0; s < growing_.size(); ++s) {
         Segment& segment = prepared.segments[s];
