@@ -208,13 +208,13 @@ void UdpSource::set_receive_buffer(const Socket& s) {
 }
 
 bool UdpSource::join_group(const Socket& s, std::string& error) const {
-    const std::string& interface = options_.multicast_interface;
+    const std::string& interface = options_.interface;
     unsigned index = interface.empty() ? 0 : ::if_nametoindex(interface.c_str());
     ip_mreqn ipv4{};
     if (index == 0 && !interface.empty()) {
         const auto address = parse_address(interface);
         if (!address || !is_ipv4(*address) || family_ != AF_INET) {
-            error = "multicast_interface: there is no interface \"" + interface + "\" (see: ip link)";
+            error = "interface: there is no interface \"" + interface + "\" (see: ip link)";
             return false;
         }
         std::memcpy(&ipv4.imr_address, address->data() + 12, 4);
@@ -234,7 +234,7 @@ bool UdpSource::join_group(const Socket& s, std::string& error) const {
     const int cause = errno;
     error = "multicast_group: " + options_.multicast_group + " cannot be joined" +
             (interface.empty() ? "" : " on " + interface) + ": " + std::strerror(cause);
-    if (interface.empty()) error += "; set multicast_interface to the interface that the sensor is on";
+    if (interface.empty()) error += "; set interface to the interface that the sensor is on";
     errno = cause;
     return false;
 }

@@ -21,7 +21,7 @@ struct UdpOptions {
     std::vector<std::uint16_t> ports;    ///< one socket each: lidar, IMU; 0 lets the kernel choose
     std::string bind_address;            ///< of this host; empty: all of them, IPv4 and IPv6
     std::string multicast_group;         ///< joined if not empty
-    std::string multicast_interface;     ///< its name or address; empty: as the routes say
+    std::string interface;               ///< its name or address; empty: as the routes say
     std::vector<std::string> senders;    ///< accepted source addresses; empty: any
     bool share_ports = false;            ///< let other programs read the same multicast group on the same ports
     std::string forward_to;              ///< "address" or "address:port" that gets a copy of every packet accepted

@@ -10,7 +10,7 @@ driver::UdpOptions udp_options(const SensorConfig& config, const driver::SensorI
     options.ports = {port(config.lidar_port, sensor.lidar_port), port(config.imu_port, sensor.imu_port)};
     options.bind_address = config.bind_address;
     options.multicast_group = config.multicast_group;
-    options.multicast_interface = config.interface;
+    options.interface = config.interface;
     if (!config.sender.empty()) options.senders = {config.sender};
     options.share_ports = config.share_ports;
     options.forward_to = config.forward_to;

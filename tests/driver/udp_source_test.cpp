@@ -305,7 +305,7 @@ class UdpMulticast : public testing::Test {
         UdpOptions o;
         o.ports = {port};
         o.multicast_group = group;
-        o.multicast_interface = "lo";
+        o.interface = "lo";
         o.share_ports = true;
         return o;
     }
@@ -392,9 +392,9 @@ TEST(UdpSourceErrors, NameTheOptionAndWhatToDo) {
     o = UdpOptions{};
     o.ports = {0};
     o.multicast_group = "239.255.76.71";
-    o.multicast_interface = "nosuch0";
-    expect(o, {"multicast_interface", "nosuch0", "ip link"});
-    o.multicast_interface = "";
+    o.interface = "nosuch0";
+    expect(o, {"interface", "nosuch0", "ip link"});
+    o.interface = "";
     o.bind_address = "::1";
     expect(o, {"bind_address", "multicast_group", "::1"});
 }
