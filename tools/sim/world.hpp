@@ -38,6 +38,7 @@ World build_square(const SceneOptions& options);
 World build_corridor(const SceneOptions& options);
 World build_street(const SceneOptions& options);
 World build_circle(const SceneOptions& options);
+World build_halts(const SceneOptions& options);
 World build_tunnel(const SceneOptions& options);
 World build_slope(const SceneOptions& options);
 
