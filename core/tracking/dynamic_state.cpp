@@ -23,6 +23,7 @@ constexpr double kAway_m = 0.15;      // from the mean place of rest
 constexpr double kRestMean = 0.1;     // weight of a new position in that mean
 constexpr double kResting = 0.5;      // of the time of rest
 constexpr int kAwayDetections = 2;    // in a row off the place of rest: it has set off
+constexpr double kSettingOff_s = 1.0;   // until it has left that place
 constexpr double kOutOfSight_s = 0.45;  // what is found after longer may be something else
 constexpr int kFewFree = 3;             // one tested point in so many lies in free space of what surely moves
 
@@ -73,6 +74,10 @@ double motion_log_odds(const MotionCues& cues, const DynamicStateConfig& config)
         sum += config.displacement_weight * (moved > 0.0 ? trust * moved : moved);
     }
     return std::clamp(sum, -kMaxStep, kMaxStep);
+}
+
+bool MotionBelief::has_set_off() const {
+    return state_ == DynamicState::kDynamic && has_set_off_ && dynamic_s_ < kSettingOff_s;
 }
 
 bool MotionBelief::update(const MotionCues& cues, const DynamicStateConfig& config) {
@@ -127,12 +132,16 @@ DynamicState MotionBelief::fused(const MotionCues& cues, const DynamicStateConfi
     const bool sure = config.use_free_space && cues.turned;
     if (sure) log_odds_ = std::max(log_odds_, config.dynamic_log_odds);
     log_odds_ = std::clamp(log_odds_ + step, config.static_log_odds - 0.5, kMaxLogOdds);
+    // What sets off stands where it stood itself: until it has left that place the free space does not speak for it.
+    const bool sets_off = config.use_displacement && cues.set_off;
+    if (sets_off && has_set_off()) log_odds_ = std::max(log_odds_, config.dynamic_log_odds);
     rest(cues, config);
     if (state_ == DynamicState::kDynamic) {
         // Where it has come to rest, the past says the same as where it has never moved: but what has long been
         // dynamic was none of that.
         const bool mistaken = log_odds_ <= config.static_log_odds;
         dynamic_s_ += cues.dt_s;
+        known_to_move_ = known_to_move_ || dynamic_s_ >= config.rest_time_s;
         const bool halted = mistaken && dynamic_s_ >= config.rest_time_s;
         rested_ = rest_s_ >= (halted ? kResting : 1.0) * config.rest_time_s;
         off_anchor_ = 0;
@@ -140,15 +149,13 @@ DynamicState MotionBelief::fused(const MotionCues& cues, const DynamicStateConfi
         log_odds_ = std::min(log_odds_, 0.0);
         return DynamicState::kStatic;
     }
-    if (rested_) {
-        // Where a rested object stands, free space was seen before it came: that says nothing of now.
-        const bool set_off = off_anchor_ >= kAwayDetections;
-        if (!set_off) return state_;
+    has_set_off_ = sets_off || (rested_ && off_anchor_ >= kAwayDetections);
+    if (has_set_off_) {
         rested_ = false;
-        rest_s_ = 0.0;
-        anchor_m_ = cues.position_m;
         log_odds_ = std::max(log_odds_, config.dynamic_log_odds);
     }
+    // Where a rested object stands, free space was seen before it came: that says nothing of now.
+    if (rested_) return state_;
     if (log_odds_ >= config.dynamic_log_odds && (sure || detections_ >= config.min_hits)) {
         rest_s_ = 0.0;
         dynamic_s_ = 0.0;

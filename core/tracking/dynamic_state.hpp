@@ -23,6 +23,7 @@ struct MotionCues {
     double displacement_log_odds = 0.0;   ///< of "moved" against "stayed", from the registration of its own points
     bool sustained_displacement = false;  ///< it has agreed with the filtered velocity for a while
     bool left_its_place = false;          ///< and is longer than that what it hides could feign
+    bool set_off = false;                 ///< what rested is displaced from where it did
     Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< filtered centre, ground plane
     double dt_s = 0.0;                                     ///< since the detection before
 
@@ -42,6 +43,10 @@ class MotionBelief {
     DynamicState state() const { return state_; }
     double log_odds() const { return log_odds_; }
     int detections() const { return detections_; }
+    /// It has been dynamic for as long as it takes to be at rest: what moves, rests and moves again.
+    bool known_to_move() const { return known_to_move_; }
+    /// It is dynamic, and became it where it had rested, a moment ago.
+    bool has_set_off() const;
 
     /// Takes in one detection; returns true where the track has just become dynamic.
     bool update(const MotionCues& cues, const DynamicStateConfig& config);
@@ -55,9 +60,11 @@ class MotionBelief {
     double log_odds_ = 0.0;
     double rest_s_ = 0.0;
     double dynamic_s_ = 0.0;  ///< in the state dynamic, the last time
+    bool known_to_move_ = false;
     int detections_ = 0;
     Eigen::Vector2d anchor_m_ = Eigen::Vector2d::Zero();  ///< where it has rested for rest_s_
     int off_anchor_ = 0;                                  ///< consecutive detections away from there
+    bool has_set_off_ = false;                            ///< the last time that it became dynamic it had rested before
     bool rested_ = false;  ///< it was dynamic and came to rest: only a displacement moves it again
 };
 

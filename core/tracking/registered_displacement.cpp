@@ -168,6 +168,8 @@ RegisteredDisplacement register_displacement(const PointSample& before, const Po
     if (before.size < kMinPoints || now.size < kMinPoints) return best;
     const Fit stayed = fit(before, now, Eigen::Vector2d::Zero());
     best.stayed_m2 = best.moved_m2 = stayed.cost_m2;
+    best.points = stayed.inliers;
+    best.normals = stayed.information / std::max(1, stayed.inliers);
     best.in_place = static_cast<double>(stayed.in_place) / static_cast<double>(now.size);
     if (stayed.inliers > 0) {
         const Eigen::Matrix2d mean = stayed.information / stayed.inliers;
@@ -182,6 +184,7 @@ RegisteredDisplacement register_displacement(const PointSample& before, const Po
                 best.moved_m2 = f.cost_m2;
                 best.displacement_m = d;
                 best.normals = f.information / std::max(1, f.inliers);
+                best.points = f.inliers;
             }
             if (f.inliers < static_cast<int>(kMinPoints) / 2) break;
             // A weak pull keeps directions that the normals do not see where they are.
@@ -199,6 +202,10 @@ Eigen::Matrix2d velocity_covariance(const RegisteredDisplacement& r, double elap
     const double changed = 0.5 * kAcceleration_mps2 * elapsed_s;
     return fit / (elapsed_s * elapsed_s) * (r.normals + 1e-3 * Eigen::Matrix2d::Identity()).inverse() +
            changed * changed * Eigen::Matrix2d::Identity();
+}
+
+double displacement_chi2(const RegisteredDisplacement& r) {
+    return r.points * r.displacement_m.dot(r.normals * r.displacement_m) / (kNoise_m * kNoise_m);
 }
 
 double displacement_log_odds(const RegisteredDisplacement& r, double elapsed_s) {

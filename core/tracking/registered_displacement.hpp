@@ -36,6 +36,7 @@ struct RegisteredDisplacement {
     /// How well the normals fix a displacement in the direction where they do so least; 0.5: in all directions alike.
     double observable = 0.0;
     Eigen::Matrix2d normals = Eigen::Matrix2d::Zero();  ///< mean of n n^T over the points that fit when displaced
+    int points = 0;                                     ///< so many do
 };
 
 /// Registers `now` to `before` by translation in the ground plane.
@@ -46,6 +47,9 @@ RegisteredDisplacement register_displacement(const PointSample& before, const Po
 /// Covariance [m^2/s^2] of the mean velocity over the displacement: noise of the fit, worse where the normals do not
 /// see a motion, and what an object may have accelerated since.
 Eigen::Matrix2d velocity_covariance(const RegisteredDisplacement& r, double elapsed_s);
+
+/// Squared length of the displacement in units of its noise: chi-squared of two degrees of freedom for what has stayed.
+double displacement_chi2(const RegisteredDisplacement& r);
 
 /// Log-odds of "moved" against "stayed": positive where a displacement explains the points much better than none,
 /// negative where they lie where they were and a motion would have shown.

@@ -34,6 +34,7 @@ constexpr int kAgreeingFrames = 4;
 constexpr double kGross_m = 1.0;       // nothing that rests seems to move that far
 constexpr int kTrustedFrames = 2;      // until the registered velocity of a large object is one
 constexpr double kLarge_m = 1.6;       // footprint diagonal
+constexpr double kEnters = 0.05;       // of the points, in free space, of what sets off for the first time
 constexpr double kStale_s = 2.0;       // older ones show another side
 constexpr double kReference_s = 0.45;  // points to register to are renewed that often
 constexpr double kReference_m = 1.0;   // and after such a way: a fast object soon shows another side
@@ -178,7 +179,7 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
     cues.shift_m = shift_m;
     cues.dt_s = unseen_s_;
     cues.position_m = filter_.box().center_m.head<2>();
-    if (config.state.use_displacement && !clear_without_displacement(cues))
+    if (config.state.use_displacement && (watched_at_rest() || !clear_without_displacement(cues)))
         displacement_cue(frame, sighting, shape.age_s, cues);
     if (config.state.use_displacement && walked) cues.take_walked_way();
 
@@ -188,6 +189,7 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
     unseen_s_ = 0.0;
     seen_now_ = true;
     residual_m_ = cues.average_residual_m;
+    const bool moved = belief_.state() == DynamicState::kDynamic;
     if (belief_.update(cues, config.state)) {
         was_dynamic_ = true;
         history_.release(cleared);
@@ -197,6 +199,7 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
         OrientedBox world = visible_;
         world.center_m += filter_.box().center_m;
         history_.add(world);
+        if (moved && belief_.known_to_move()) come_to_rest();
     }
 }
 
@@ -244,6 +247,20 @@ bool TrackedObject::dead(const TrackingConfig& config) const {
     return misses_ > (established ? config.max_misses : config.max_misses_undecided);
 }
 
+void TrackedObject::come_to_rest() {
+    set_off_.rest();
+    before_.age_s = since_.age_s = 2.0 * kStale_s;
+}
+
+bool TrackedObject::rests_awhile() const {
+    return belief_.known_to_move() && hits_ > 0 && (belief_.state() == DynamicState::kStatic || belief_.has_set_off());
+}
+
+bool TrackedObject::watched_at_rest() const {
+    if (rests_awhile() || set_off_.suspected()) return true;
+    return belief_.state() == DynamicState::kStatic && since_.age_s > kReference_s && is_body();
+}
+
 bool TrackedObject::clear_without_displacement(const MotionCues& cues) const {
     const double share = free_share(cues);
     if (share < 0.0 || hits_ == 0 || agreeing_ > 0) return false;
@@ -274,6 +291,10 @@ void TrackedObject::displacement_cue(const Frame& frame, const Sighting& sightin
         cues.displacement_log_odds = displacement_log_odds(r, elapsed_s);
         if (sighting.visibility.through_gap() && cues.free_points == 0)
             cues.displacement_log_odds = std::min(cues.displacement_log_odds, 0.0);
+        // Of what has never moved all has to speak for it: a wall seen through an opening seems to be displaced.
+        const bool rests = rests_awhile() || (belief_.state() == DynamicState::kStatic && is_body());
+        cues.set_off = rests && set_off_.update(r, cues) &&
+                       (belief_.known_to_move() || (set_off_.left_its_place() && free_share(cues) > kEnters));
         const double length_m = r.displacement_m.norm();
         const auto agrees_with = [&](const Eigen::Vector2d& velocity_mps) {
             return (r.displacement_m - elapsed_s * velocity_mps).norm() < kAgreement * length_m;
@@ -290,7 +311,8 @@ void TrackedObject::displacement_cue(const Frame& frame, const Sighting& sightin
         if (agreeing_ >= kTrustedFrames && filter_.box().size_m.head<2>().norm() > kLarge_m)
             filter_.update_velocity(registered_velocity_mps_, velocity_covariance(r, elapsed_s));
     }
-    if (since_.age_s > kReference_s || (center - since_center_m_).norm() > kReference_m) {
+    const bool suspected = belief_.state() == DynamicState::kStatic && set_off_.suspected();
+    if (!suspected && (since_.age_s > kReference_s || (center - since_center_m_).norm() > kReference_m)) {
         before_ = since_;
         before_center_m_ = since_center_m_;
         since_ = now;

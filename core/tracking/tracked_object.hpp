@@ -10,6 +10,7 @@
 #include "core/tracking/expected_sight.hpp"
 #include "core/tracking/object_extent.hpp"
 #include "core/tracking/registered_displacement.hpp"
+#include "core/tracking/set_off.hpp"
 #include "core/tracking/walked_way.hpp"
 
 namespace dlod {
@@ -80,6 +81,12 @@ class TrackedObject {
     /// What is no larger than a person when it begins to move was taken together with what it stood at.
     void leave_background(const Visibility& visibility);
     bool clear_without_displacement(const MotionCues& cues) const;
+    /// What it looked like while it moved says nothing of how it rests.
+    void come_to_rest();
+    /// It is known to move, and rests or has set off just now.
+    bool rests_awhile() const;
+    /// How it rests is looked at in this frame.
+    bool watched_at_rest() const;
     /// Registers this frame's points to earlier ones, and renews those.
     /// @param age_s of the points before the stamp
     void displacement_cue(const Frame& frame, const Sighting& sighting, double age_s, MotionCues& cues);
@@ -100,6 +107,7 @@ class TrackedObject {
     Eigen::Vector2d registered_velocity_mps_ = Eigen::Vector2d::Zero();  ///< by the last registration, 0 if not clear
     int agreeing_ = 0;  ///< frames in a row in which it agreed with the filter's or that of the frame before
     WalkedWay walked_way_;
+    SetOff set_off_;
     double lifetime_s_ = 0.0;
     bool was_dynamic_ = false;
     double unseen_s_ = 0.0;

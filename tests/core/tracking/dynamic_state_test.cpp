@@ -182,5 +182,34 @@ TEST(DynamicState, WhatCameToRestSetsOffByItsWayAloneEvenIfThePastSpokeAgainstIt
     EXPECT_EQ(belief.state(), DynamicState::kDynamic);
 }
 
+// He who stood for seconds has hidden the ground that he leaves, and his old place was occupied by himself.
+TEST(DynamicState, WhatSetsOffIsDynamicAtOnceWhateverTheFreeSpaceSaysOfIt) {
+    const DynamicStateConfig config;
+    MotionBelief belief;
+    for (int n = 0; n < 35; ++n) belief.update(free_cue(60, 10), config);
+    ASSERT_TRUE(belief.known_to_move());
+    for (int n = 0; n < 35; ++n) belief.update(free_cue(0, 100), config);
+    ASSERT_EQ(belief.state(), DynamicState::kStatic);
+    MotionCues cues = free_cue(2, 98);
+    cues.set_off = true;
+    EXPECT_TRUE(belief.update(cues, config));
+    EXPECT_TRUE(belief.has_set_off());
+    for (int n = 0; n < 8; ++n) belief.update(cues, config);
+    EXPECT_EQ(belief.state(), DynamicState::kDynamic);
+}
+
+TEST(DynamicState, ADepartureThatLeadsNowhereIsTakenBack) {
+    const DynamicStateConfig config;
+    MotionBelief belief;
+    for (int n = 0; n < 35; ++n) belief.update(free_cue(60, 10), config);
+    for (int n = 0; n < 35; ++n) belief.update(free_cue(0, 100), config);
+    MotionCues cues = free_cue(0, 100);
+    cues.set_off = true;
+    belief.update(cues, config);
+    ASSERT_EQ(belief.state(), DynamicState::kDynamic);
+    for (int n = 0; n < 5; ++n) belief.update(free_cue(0, 100), config);
+    EXPECT_EQ(belief.state(), DynamicState::kStatic);
+}
+
 }  // namespace
 }  // namespace dlod
