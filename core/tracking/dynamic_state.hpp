@@ -45,6 +45,8 @@ class MotionBelief {
     int detections() const { return detections_; }
     /// It has been dynamic for as long as it takes to be at rest: what moves, rests and moves again.
     bool known_to_move() const { return known_to_move_; }
+    /// It was dynamic, and stands.
+    bool rested() const { return rested_; }
     /// It is dynamic, and became it where it had rested, a moment ago.
     bool has_set_off() const;
 

@@ -19,7 +19,8 @@ constexpr int kIterations = 4;
 constexpr double kNoise_m = 0.04;     // of a plane distance: pose, range noise, curvature
 constexpr double kIndependent = 6.0;  // so many independent points are believed in, however many there are
 constexpr double kPrior = 1.5;        // log-odds that a displacement must gain to be believed in
-constexpr double kSlow_mps = 0.3;     // slower motions may hide in the noise
+constexpr double kUnexplained_m2 = 2.0 * kPrior * kNoise_m * kNoise_m / kIndependent;  // less leaves no room for that
+constexpr double kSlow_mps = 0.3;  // slower motions may hide in the noise
 constexpr double kMinObservable = 0.12;
 constexpr double kAgainst = -0.7;    // "stayed" for one more frame
 constexpr double kMaxFit_m = 0.06;   // a worse fit than that is none
@@ -179,7 +180,7 @@ RegisteredDisplacement register_displacement(const PointSample& before, const Po
     for (const Eigen::Vector2d& start : {Eigen::Vector2d::Zero().eval(), guess_m, between_means(before, now)}) {
         Eigen::Vector2d d = start;
         for (int k = 0; k < kIterations; ++k) {
-            const Fit f = fit(before, now, d);
+            const Fit f = d.isZero(0.0) ? stayed : fit(before, now, d);
             if (f.cost_m2 < best.moved_m2) {
                 best.moved_m2 = f.cost_m2;
                 best.displacement_m = d;
@@ -193,6 +194,8 @@ RegisteredDisplacement register_displacement(const PointSample& before, const Po
             d += step;
             if (step.norm() < 0.005) break;
         }
+        // No displacement from farther off can explain the points so much better than none.
+        if (stayed.cost_m2 < kUnexplained_m2) break;
     }
     return best;
 }

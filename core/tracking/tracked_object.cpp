@@ -199,7 +199,7 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
         OrientedBox world = visible_;
         world.center_m += filter_.box().center_m;
         history_.add(world);
-        if (moved && belief_.known_to_move()) come_to_rest();
+        if (moved && belief_.rested()) come_to_rest();
     }
 }
 
