@@ -125,19 +125,25 @@ bool TurnedPlates::is_gone(const Frame& frame, const EvidenceImage& evidence, co
 void TurnedPlates::find(const Frame& frame, const EvidenceImage& evidence) {
     for (const PlatePlace& place : places_.found()) {
         collect(frame, evidence, place);
-        // The older reference shows more of a turn, the newer one more of the plate.
-        std::size_t reference = kOlder;
-        std::optional<PlateTurn> turn = turn_fit_.find(points_, place, reference);
-        if (!turn) {
-            reference = kNewer;
-            turn = turn_fit_.find(points_, place, reference);
-        }
-        if (!turn) continue;
-        set_heights(*turn);
-        if (is_gone(frame, evidence, place, *turn, reference) && goes_on(*turn) &&
-            turn->high_m - turn->low_m > config_.min_height_m)
+        // The older reference shows more of a turn, the newer one more of the plate: either may tell.
+        for (const std::size_t reference : {kOlder, kNewer}) {
+            const std::optional<PlateTurn> turn = find_plate(frame, evidence, place, reference);
+            if (!turn) continue;
             fill(frame, place, *turn);
+            break;
+        }
     }
+}
+
+/// The plate that the points of the place are, if they are one that has turned since the reference and still does.
+std::optional<PlateTurn> TurnedPlates::find_plate(const Frame& frame, const EvidenceImage& evidence,
+                                                  const PlatePlace& place, std::size_t reference) {
+    std::optional<PlateTurn> turn = turn_fit_.find(points_, place, reference);
+    if (!turn) return std::nullopt;
+    set_heights(*turn);
+    const bool plate = turn->high_m - turn->low_m > config_.min_height_m && goes_on(*turn) &&
+                       is_gone(frame, evidence, place, *turn, reference);
+    return plate ? turn : std::nullopt;
 }
 
 /// It has turned since either reference, and the less since the newer one.

@@ -6,6 +6,7 @@
 // body.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -42,6 +43,8 @@ class TurnedPlates {
 
   private:
     void collect(const Frame& frame, const EvidenceImage& evidence, const PlatePlace& place);
+    std::optional<PlateTurn> find_plate(const Frame& frame, const EvidenceImage& evidence, const PlatePlace& place,
+                                        std::size_t reference);
     bool is_gone(const Frame& frame, const EvidenceImage& evidence, const PlatePlace& place, const PlateTurn& turn,
                  std::size_t reference);
     bool goes_on(const PlateTurn& turn) const;
