@@ -28,6 +28,20 @@ bool is_silent(const FaultOptions& faults, double t) {
                        [&](double at) { return within(at, FaultOptions::kRestart_s); });
 }
 
+bool imu_is_faulty(const FaultOptions& faults, double t, double duration_s) {
+    if (faults.imu_fault_s) {
+        const auto [from, length] = *faults.imu_fault_s;
+        return t >= from && t < from + length;
+    }
+    if (faults.imu == ImuFault::kSilent) return t > 0.4 * duration_s;
+    if (faults.imu == ImuFault::kStuck) return t > 0.3 * duration_s;
+    return faults.imu != ImuFault::kNone;
+}
+
+double clock_offset_s(const FaultOptions& faults, double t) {
+    return faults.clock_step_s && t >= faults.clock_step_s->first ? faults.clock_step_s->second : 0.0;
+}
+
 int restarts_before(const FaultOptions& faults, double t) {
     return static_cast<int>(std::count_if(faults.restarts_s.begin(), faults.restarts_s.end(),
                                           [t](double at) { return t >= at + FaultOptions::kRestart_s; }));

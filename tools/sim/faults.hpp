@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -12,7 +13,7 @@
 
 namespace dlod::tools::sim {
 
-enum class ImuFault { kNone, kOff, kSilent, kStuck, kSpikes, kAxes };
+enum class ImuFault { kNone, kOff, kSilent, kStuck, kSpikes, kAxes, kScale };
 
 struct FaultOptions {
     double loss = 0.0;         ///< share of the lidar packets that never arrive
@@ -23,6 +24,8 @@ struct FaultOptions {
     std::vector<double> restarts_s;                      ///< the sensor restarts and is away for kRestart_s
     std::vector<std::pair<double, double>> sectors_deg;  ///< columns that are marked invalid: from, to, by encoder
     ImuFault imu = ImuFault::kNone;
+    std::optional<std::pair<double, double>> imu_fault_s;   ///< when the IMU has it: from, length; else by kind
+    std::optional<std::pair<double, double>> clock_step_s;  ///< from a time on, all stamps are off by so much
 
     static constexpr double kRestart_s = 0.55;
 };
@@ -34,6 +37,12 @@ std::string_view name_of(PacketFault fault);
 
 /// True where nothing is sent at a time: a gap, or a sensor that restarts.
 bool is_silent(const FaultOptions& faults, double t);
+
+/// True where the IMU has its fault at a time of a drive of this length.
+bool imu_is_faulty(const FaultOptions& faults, double t, double duration_s);
+
+/// What the sensor's clock shows more than the time.
+double clock_offset_s(const FaultOptions& faults, double t);
 
 /// Number of restarts that a sensor has behind it at a time.
 int restarts_before(const FaultOptions& faults, double t);

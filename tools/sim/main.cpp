@@ -55,11 +55,14 @@ struct Options {
     FaultOptions faults;
     std::vector<std::string> gaps;
     std::vector<std::string> sectors;
+    std::string imu_fault;
+    std::string clock_step;
 };
 
 const std::map<std::string, ImuFault> kImuFaults{{"good", ImuFault::kNone},     {"off", ImuFault::kOff},
                                                  {"silent", ImuFault::kSilent}, {"stuck", ImuFault::kStuck},
-                                                 {"spikes", ImuFault::kSpikes}, {"axes", ImuFault::kAxes}};
+                                                 {"spikes", ImuFault::kSpikes}, {"axes", ImuFault::kAxes},
+                                                 {"scale", ImuFault::kScale}};
 
 /// Two numbers with a colon between.
 std::pair<double, double> parse_pair(const std::string& text, const char* option) {
@@ -101,6 +104,8 @@ std::string describe(const FaultOptions& f) {
     for (const auto& [name, fault] : kImuFaults) {
         if (f.imu == fault && fault != ImuFault::kNone) j["imu"] = name;
     }
+    if (f.imu_fault_s) j["imu_fault_s"] = *f.imu_fault_s;
+    if (f.clock_step_s) j["clock_step_s"] = *f.clock_step_s;
     return j.dump();
 }
 
@@ -127,6 +132,11 @@ void add_options(CLI::App& app, Options& o) {
         ->excludes(duration);
     app.add_option("--movers", o.movers, "all, or none: nobody is there")
         ->check(CLI::IsMember({"all", "none"}))
+        ->capture_default_str();
+    app.add_option("--crowd", o.world.crowd, "so many people stand and walk close around the robot's start")
+        ->check(CLI::Range(0, 200))
+        ->capture_default_str();
+    app.add_flag("--buses", o.world.buses, "street: all that overtakes the robot is buses, close by")
         ->capture_default_str();
     app.add_flag("--start-moving", o.start_moving,
                  "the robot is in motion when the drive starts; else it stands for 1 s");
@@ -168,9 +178,15 @@ void add_options(CLI::App& app, Options& o) {
     app.add_option("--missing-sector", o.sectors, "columns between two encoder angles are invalid, degrees")
         ->type_name("FROM:TO");
     app.add_option("--imu", o.faults.imu,
-                   "good; off: none; silent: ends after 40 %; stuck: one value after 30 %; spikes; axes: wrong ones")
+                   "good; off: none; silent: ends after 40 %; stuck: one value after 30 %; spikes; axes: wrong ones; "
+                   "scale: half as much again")
         ->transform(CLI::CheckedTransformer(kImuFaults))
         ->type_name("STATE");
+    app.add_option("--imu-fault", o.imu_fault, "the IMU is in this state from second FROM on, for LENGTH seconds only")
+        ->type_name("FROM:LENGTH");
+    app.add_option("--clock-step", o.clock_step,
+                   "the sensor's clock jumps by so many seconds; the truth keeps the time")
+        ->type_name("AT:BY");
 
     app.add_option("--live", o.live, "send over UDP at true rate; the ports are the metadata's, or PORT and PORT + 1")
         ->type_name("HOST[:PORT]");
@@ -209,6 +225,8 @@ void prepare(Options& o) {
     for (const std::string& sector : o.sectors) {
         o.faults.sectors_deg.push_back(parse_pair(sector, "--missing-sector"));
     }
+    if (!o.imu_fault.empty()) o.faults.imu_fault_s = parse_pair(o.imu_fault, "--imu-fault");
+    if (!o.clock_step.empty()) o.faults.clock_step_s = parse_pair(o.clock_step, "--clock-step");
     std::sort(o.faults.restarts_s.begin(), o.faults.restarts_s.end());
     o.world.movers = o.movers == "all";
     o.world.robot.wobble = !o.no_wobble;

@@ -11,6 +11,7 @@ namespace {
 constexpr std::uint64_t kFaultStream = 0xFA17;
 constexpr double kLidarDelay_s = 0.00025;  ///< from the last column's firing to the packet's arrival
 constexpr double kImuDelay_s = 0.0011;
+constexpr double kWrongScale = 1.5;
 constexpr std::uint32_t kTicksATurn = 90112;  ///< of LEGACY's encoder
 
 std::int64_t to_ns(double seconds) {
@@ -106,10 +107,11 @@ void PacketStream::encode(const Scan& scan, int first_column, std::uint32_t fram
     for (int c = 0; c < sensor_.columns_per_packet; ++c) {
         const int m = first_column + c;
         const double fired_s = scan.start_s + model.frame_period_s * m / W;
+        const double shown_s = fired_s + clock_offset_s(faults_, fired_s);
         const bool valid = !invalid && m < W && !in_missing_sector(faults_, 360.0 * m / W);
         layout_.write_column_header(
             bytes, c,
-            {.time_ns = static_cast<std::uint64_t>(kEpoch_ns + to_ns(fired_s)),
+            {.time_ns = static_cast<std::uint64_t>(kEpoch_ns + to_ns(shown_s)),
              .measurement_id = static_cast<std::uint16_t>(m),
              .frame_id = static_cast<std::uint16_t>(frame_id),
              .encoder_count = kTicksATurn * static_cast<std::uint32_t>(m) / static_cast<std::uint32_t>(W),
@@ -150,22 +152,26 @@ void PacketStream::corrupt(std::vector<std::byte>& bytes, int kind, Random& rand
 void PacketStream::push_imu(double until_s) {
     for (; ImuSimulator::time_s(next_imu_) < until_s; ++next_imu_) {
         const double t = ImuSimulator::time_s(next_imu_);
-        if (faults_.imu == ImuFault::kOff || is_silent(faults_, t)) continue;
-        const double share = t / duration_s_;
-        if (faults_.imu == ImuFault::kSilent && share > 0.4) continue;
+        if (is_silent(faults_, t)) continue;
+        const ImuFault fault = imu_is_faulty(faults_, t, duration_s_) ? faults_.imu : ImuFault::kNone;
+        if (fault == ImuFault::kOff || fault == ImuFault::kSilent) continue;
         ImuReading reading = imu_.measured(next_imu_);
         Random random(seed_, kFaultStream + 1, static_cast<std::uint64_t>(next_imu_));
-        if (faults_.imu == ImuFault::kStuck && share > 0.3) {
-            reading = imu_.measured(static_cast<int>(0.3 * duration_s_ / ImuSimulator::kPeriod_s));
-        } else if (faults_.imu == ImuFault::kSpikes && random.chance(0.03)) {
+        if (fault == ImuFault::kStuck) {
+            const double from_s = faults_.imu_fault_s ? faults_.imu_fault_s->first : 0.3 * duration_s_;
+            reading = imu_.measured(static_cast<int>(from_s / ImuSimulator::kPeriod_s));
+        } else if (fault == ImuFault::kSpikes && random.chance(0.03)) {
             reading.acceleration_mps2 += Vec3(random.normal(), random.normal(), random.normal()) * 100.0;
             reading.angular_velocity_radps += Vec3(random.normal(), random.normal(), random.normal()) * 15.0;
-        } else if (faults_.imu == ImuFault::kAxes) {
+        } else if (fault == ImuFault::kScale) {
+            reading.acceleration_mps2 *= kWrongScale;
+            reading.angular_velocity_radps *= kWrongScale;
+        } else if (fault == ImuFault::kAxes) {
             for (Vec3* v : {&reading.acceleration_mps2, &reading.angular_velocity_radps}) {
                 *v = Vec3(v->z(), -v->x(), v->y());
             }
         }
-        const ImuSample sample{.stamp_ns = kEpoch_ns + to_ns(t),
+        const ImuSample sample{.stamp_ns = kEpoch_ns + to_ns(t + clock_offset_s(faults_, t)),
                                .acceleration_mps2 = reading.acceleration_mps2.cast<float>(),
                                .angular_velocity_radps = reading.angular_velocity_radps.cast<float>()};
         std::vector<std::byte> bytes(driver::kLegacyImuPacketBytes);

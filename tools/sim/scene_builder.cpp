@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "tools/sim/actors/cyclist.hpp"
 #include "tools/sim/actors/dog.hpp"
@@ -132,6 +133,29 @@ void SceneBuilder::add_passers(int count, double near_m, double far_m) {
     }
 }
 
+void SceneBuilder::add_crowd(int count) {
+    const Vec2 middle = path_.point(0.0);
+    const auto around = [&] {
+        Vec2 p = Vec2::Zero();
+        for (int i = 0; i < 100; ++i) {
+            const double angle = random_.uniform(0.0, 2.0 * std::numbers::pi);
+            p = middle + random_.uniform(1.0, 5.0) * Vec2(std::cos(angle), std::sin(angle));
+            if (is_free(p, 0.4, 0.0)) break;
+        }
+        return p;
+    };
+    for (int i = 0; i < count; ++i) {
+        Walker w;
+        w.speed_mps = random_.uniform(0.5, 1.2);
+        w.start = around();
+        for (int k = random_.integer(3, 5); k > 0; --k) {
+            w.route.push_back(around());
+            w.pause_s.push_back(random_.chance(0.3) ? random_.uniform(1.0, 4.0) : 0.0);
+        }
+        add_walker(Kind::kPerson, std::move(w));
+    }
+}
+
 void SceneBuilder::add_lane(const ArcPath& lane, const std::vector<std::pair<std::string, Driver>>& vehicles,
                             const std::vector<StopLine>& stops) {
     if (!options_.movers) return;
@@ -155,6 +179,7 @@ void SceneBuilder::add_lane(const ArcPath& lane, const std::vector<std::pair<std
 }
 
 World SceneBuilder::finish() {
+    add_crowd(options_.crowd);
     world_.robot = RobotMotion(path_, terrain_, options_.robot, options_.duration_s);
     if (!options_.movers) walkers_.clear();
     std::vector<Motion> motions = walk_crowd(walkers_, obstacles_, world_.robot, options_.duration_s);

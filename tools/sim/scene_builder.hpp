@@ -53,6 +53,8 @@ class SceneBuilder {
     int add_wanderer(Kind kind, const Rectangle& area, double speed_mps, double pause_share);
     /// People who walk to and fro near the robot's way, at a distance from it between two limits.
     void add_passers(int count, double near_m, double far_m);
+    /// People who stand and walk around the start of the robot's way.
+    void add_crowd(int count);
     /// Vehicles of a lane, from the foremost to the last; `kind` is car, van or bus.
     void add_lane(const ArcPath& lane, const std::vector<std::pair<std::string, Driver>>& vehicles,
                   const std::vector<StopLine>& stops);

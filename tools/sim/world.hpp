@@ -15,6 +15,8 @@ struct SceneOptions {
     std::uint64_t seed = 1;
     double duration_s = 10.0;
     bool movers = true;  ///< false: nobody moves, nobody is there
+    int crowd = 0;       ///< so many people close around the robot's start
+    bool buses = false;  ///< street: buses, one after the other, in the lane beside the robot
     RobotOptions robot;
 };
 

@@ -102,8 +102,9 @@ void add_traffic(SceneBuilder& b, double begin, double end) {
     double s = light.s_m + 25.0;
     const int cars = 5 + static_cast<int>(b.options().duration_s / 6.0);
     for (int i = 0; i < cars; ++i) {
-        const char* kind = i == 2 ? "bus" : random.chance(0.2) ? "van" : "car";
-        lane.emplace_back(kind, driver(s, i == 2 ? 12.0 : 4.6, random.uniform(7.0, 13.0)));
+        const bool bus = i == 2 || b.options().buses;
+        const char* kind = bus ? "bus" : random.chance(0.2) ? "van" : "car";
+        lane.emplace_back(kind, driver(s, bus ? 12.0 : 4.6, random.uniform(7.0, 13.0)));
         s -= random.uniform(14.0, 26.0);
     }
     b.add_lane(east, lane, {light});
