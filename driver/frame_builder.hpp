@@ -18,7 +18,7 @@
 namespace dlod::driver {
 
 struct FrameBuilderConfig {
-    double minimum_valid_share = 0.4;
+    double minimum_valid_share = 0.25;
     double time_tolerance_turns = 0.05;
 
     template <class V>
