@@ -28,6 +28,20 @@ constexpr double kSameViewShare = 0.85;
 // For the same: surfaces by the direction that they face in the plan, and points of one that make it count.
 constexpr std::size_t kViewDirections = 4;
 constexpr double kMinViewPoints = 100.0;
+// A scan shows structure along a direction with so many points that face it; a map of the same place has more than this
+// share of them.
+constexpr double kMinFacingPoints = 20.0;
+constexpr double kFoundShare = 0.25;
+// Looking for the robot around its prediction: so far, and in such steps.
+constexpr double kSearchDeviations = 2.0;
+constexpr double kSearchStep_m = 0.7;
+constexpr int kSearchRings = 2;
+constexpr double kSearchStep_rad = 0.15;
+constexpr int kSearchTurns = 2;
+// It is found where so much more fits than at any place farther off than this.
+constexpr double kUniqueFit = 1.3;
+constexpr double kElsewhere_m = 0.3;
+constexpr double kElsewhere_rad = 0.1;
 // What a robot may be at when it is switched on: velocities to begin with, in eight directions of the horizontal plane.
 constexpr double kFirstSpeeds_mps[] = {5.0, 10.0, 15.0};
 constexpr int kFirstDirections = 8;
@@ -69,18 +83,81 @@ bool Odometry::State::estimate(const Frame& frame) {
         const double widening = std::clamp(deviation / kSureDeviation_m, 1.0, kMaxWidening);
         register_frame(frame, widening > 1.0 ? kBootstrapIterations : config.scan_to_scan.iterations, widening);
     }
-    if (is_trustworthy()) {
-        if (bootstrapping && first_scan_is_void()) void_scan_ns = first_filter.stamp_ns();
-        filter.finish_update();
-        held.end_frame();
-        see_uncertainty();
-        if (filter.uses_imu() && monitor.quiet()) {
-            const Observability::Directions u = held.observability().directions();
-            for (Eigen::Index k = 0; k < u.cols(); ++k) filter.observe_rest(u.col(k).head<3>());
-        }
+    if (is_trustworthy() && !is_beside_its_map(points)) {
+        accept();
         return true;
     }
     filter.discard_update();
+    return false;
+}
+
+void Odometry::State::accept() {
+    if (bootstrapping && first_scan_is_void()) void_scan_ns = first_filter.stamp_ns();
+    filter.finish_update();
+    held.end_frame();
+    see_uncertainty();
+    if (filter.uses_imu() && monitor.quiet()) {
+        const Observability::Directions u = held.observability().directions();
+        for (Eigen::Index k = 0; k < u.cols(); ++k) filter.observe_rest(u.col(k).head<3>());
+    }
+}
+
+/// The prediction may be too far off for the registration to find the way: looks around it, as far as it may be. What
+/// is found counts if it explains clearly more than whatever is found elsewhere.
+bool Odometry::State::find_again(const Frame& frame) {
+    const Matrix6d deviation = filter.pose_covariance();
+    const double far_m = kSearchDeviations * std::sqrt(deviation.topLeftCorner<2, 2>().trace());
+    const double far_rad = kSearchDeviations * std::sqrt(deviation(5, 5));
+    const MotionFilter predicted = filter;
+    const HeldDirections held_before = held;
+    const std::uint32_t flags_before = flags;
+    MotionFilter best = predicted;
+    Eigen::Isometry3d found = Eigen::Isometry3d::Identity();
+    double best_fit = 0.0;
+    double other_fit = 0.0;
+    const auto look = [&](const Eigen::Vector3d& offset_m, double turn_rad) {
+        filter = predicted;
+        filter.move(offset_m, turn_rad);
+        held.reset();
+        const MotionFilter from = filter;
+        update_sweep(frame);
+        register_frame(frame, kTrialIterations, kMaxWidening);
+        scan_to_submap.match(frame.prepared.points, excluded, placed, keyframes.submap(), origin, 1.0, matches);
+        const double now = fit();
+        const Eigen::Isometry3d difference = found.inverse() * filter.T_world_sensor();
+        const bool elsewhere = difference.translation().norm() > kElsewhere_m ||
+                               Eigen::AngleAxisd(difference.rotation()).angle() > kElsewhere_rad;
+        if (elsewhere) other_fit = std::max(other_fit, std::min(now, best_fit));
+        if (now > best_fit) {
+            best_fit = now;
+            best = from;
+            found = filter.T_world_sensor();
+        }
+    };
+    for (int ring = 0; ring <= kSearchRings && ring * kSearchStep_m <= far_m; ++ring) {
+        for (int heading = 0; heading < (ring == 0 ? 1 : kFirstDirections); ++heading) {
+            const double angle = 2.0 * std::numbers::pi * heading / kFirstDirections;
+            const Eigen::Vector3d offset_m =
+                ring * kSearchStep_m * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0.0);
+            look(offset_m, 0.0);
+            for (int turn = 1; turn <= kSearchTurns && turn * kSearchStep_rad <= far_rad; ++turn) {
+                look(offset_m, turn * kSearchStep_rad);
+                look(offset_m, -turn * kSearchStep_rad);
+            }
+        }
+    }
+    filter = best;
+    held.reset();
+    flags = flags_before;
+    update_sweep(frame);
+    register_frame(frame, kBootstrapIterations, kMaxWidening);
+    if (is_trustworthy() && fit() > std::max(kMinFacingPoints, kUniqueFit * other_fit)) {
+        accept();
+        return true;
+    }
+    filter = predicted;
+    held = held_before;
+    flags = flags_before;
     return false;
 }
 
@@ -125,6 +202,31 @@ bool Odometry::State::is_trustworthy() {
         return false;
     }
     return static_cast<double>(near) >= kMinNearShare * static_cast<double>(matches.count);
+}
+
+/// The pose may be anywhere along a direction that the prediction holds, and yet the scan shows surfaces that face this
+/// direction: it is no tunnel, the map around the believed pose is another place's.
+bool Odometry::State::is_beside_its_map(const PointSelection& points) const {
+    const Observability::Directions held_directions = held.observability().directions();
+    const Matrix6d deviation = filter.pose_covariance();
+    for (Eigen::Index k = 0; k < held_directions.cols(); ++k) {
+        const Vector6d direction = held_directions.col(k);
+        if (direction.head<3>().isZero()) continue;
+        if (direction.dot(deviation * direction) < config.max_deviation_m * config.max_deviation_m) continue;
+        const Eigen::Vector3f u = direction.head<3>().cast<float>();
+        double seen = 0.0;
+        for (std::size_t i = 0; i < excluded.size(); ++i) {
+            const float along = placed.nx[i] * u.x() + placed.ny[i] * u.y() + placed.nz[i] * u.z();
+            seen += points.planarity[i] > 0.0F && !excluded[i] && Observability::is_facing(along) ? 1.0 : 0.0;
+        }
+        double found = 0.0;
+        for (std::size_t i = 0; i < matches.count; ++i) {
+            const float along = matches.h[0][i] * u.x() + matches.h[1][i] * u.y() + matches.h[2][i] * u.z();
+            found += Observability::is_facing(along) ? 1.0 : 0.0;
+        }
+        if (seen >= kMinFacingPoints && found < kFoundShare * seen) return true;
+    }
+    return false;
 }
 
 /// Number of points up to the last one that takes part in the registration: they come first.

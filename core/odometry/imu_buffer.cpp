@@ -9,6 +9,9 @@ constexpr float kMaxAngularVelocity_radps = 50.0F;
 constexpr float kMaxAcceleration_mps2 = 200.0F;
 // Samples older than the newest one by more than this come from a clock that has been set back.
 constexpr std::int64_t kClockStep_ns = 500'000'000;
+// Between samples that are farther apart than this nothing is known.
+constexpr std::int64_t kSilence_ns = 100'000'000;
+constexpr std::int64_t kMean_ns = 1'000'000'000;
 constexpr double kSpike_radps = 3.0;
 constexpr double kSpike_mps2 = 60.0;
 
@@ -70,6 +73,28 @@ Eigen::Vector3d ImuBuffer::turn(std::int64_t from_ns, std::int64_t to_ns) const 
     for (int i = 0; i < kSteps; ++i)
         sum += at(from_ns + (to_ns - from_ns) * (2 * i + 1) / (2 * kSteps)).angular_velocity_radps;
     return sum / kSteps * (static_cast<double>(to_ns - from_ns) * 1e-9);
+}
+
+bool ImuBuffer::is_silent_at(std::int64_t time_ns) const {
+    if (time_ns >= newest_ns()) return time_ns - newest_ns() > kSilence_ns;
+    std::size_t i = count_ - 1;
+    while (i > 0 && stored(i - 1).stamp_ns > time_ns) --i;
+    return i > 0 && stored(i).stamp_ns - stored(i - 1).stamp_ns > kSilence_ns;
+}
+
+Eigen::Vector3d ImuBuffer::mean_rate_before(std::int64_t time_ns) const {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    int samples = 0;
+    std::int64_t last_ns = time_ns;
+    for (std::size_t i = count_; i-- > 0;) {
+        const Stored& s = stored(i);
+        if (s.stamp_ns > time_ns) continue;
+        if (samples == 0) last_ns = s.stamp_ns;
+        if (last_ns - s.stamp_ns > kMean_ns) break;
+        sum += s.reading.angular_velocity_radps;
+        ++samples;
+    }
+    return sum / std::max(1, samples);
 }
 
 ImuBuffer::Reading ImuBuffer::at(std::int64_t time_ns) const {

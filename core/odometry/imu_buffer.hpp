@@ -32,6 +32,11 @@ class ImuBuffer {
     /// Linear between samples; before the first and after the last, that sample's. The buffer must not be empty.
     Reading at(std::int64_t time_ns) const;
 
+    /// No sample is near this time.
+    bool is_silent_at(std::int64_t time_ns) const;
+    /// Mean angular velocity over the second that ends with the last sample before this time.
+    Eigen::Vector3d mean_rate_before(std::int64_t time_ns) const;
+
   private:
     static constexpr std::size_t kCapacity = 512;
     struct Stored {

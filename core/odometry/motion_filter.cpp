@@ -17,6 +17,7 @@ constexpr int kGravity = 15;
 
 constexpr double kPredictionStep_s = 2.5e-3;
 constexpr double kCovarianceStep_s = 0.1;
+constexpr std::int64_t kLongGap_ns = 350'000'000;
 constexpr double kUnknownVelocity_mps = 3.0;  // standard deviation at the start
 // Without IMU: time over which the robot's accelerations are averaged.
 constexpr double kMotionMemory_s = 1.0;
@@ -84,17 +85,24 @@ Eigen::Vector3d MotionFilter::body_rate(const MotionState& s, std::int64_t time_
     return imu_->at(time_ns).angular_velocity_radps - s.rate_radps;
 }
 
+/// What of a turn rate goes on for long: a robot pitches and rolls to and fro, and turns about the vertical.
+Eigen::Vector3d MotionFilter::lasting(const MotionState& s, const Eigen::Vector3d& rate_radps) {
+    const Eigen::Vector3d down = s.rotation.conjugate() * s.gravity_mps2.normalized();
+    return down * down.dot(rate_radps);
+}
+
 /// Moves the state by dt, which may be negative, with the readings in the middle.
 void MotionFilter::advance(MotionState& s, std::int64_t mid_ns, double dt) const {
     Eigen::Vector3d rate = s.rate_radps;
     Eigen::Vector3d acceleration;
-    if (imu_ != nullptr) {
+    if (imu_ != nullptr && !imu_->is_silent_at(mid_ns)) {
         const ImuBuffer::Reading reading = imu_->at(mid_ns);
         rate = reading.angular_velocity_radps - s.rate_radps;
         const Eigen::Quaterniond middle = s.rotation * so3_exp(0.5 * dt * rate);
         acceleration = middle * (reading.acceleration_mps2 - s.accelerometer_bias_mps2) + s.gravity_mps2;
     } else {
         // A constant velocity in the body's axes: the path is an arc.
+        if (imu_ != nullptr) rate = lasting(s, imu_->mean_rate_before(mid_ns) - s.rate_radps);
         acceleration = (s.rotation * rate).cross(s.velocity_mps);
     }
     s.rotation = (s.rotation * so3_exp(dt * rate)).normalized();
@@ -103,6 +111,7 @@ void MotionFilter::advance(MotionState& s, std::int64_t mid_ns, double dt) const
 }
 
 void MotionFilter::predict(std::int64_t stamp_ns) {
+    if (imu_ == nullptr && stamp_ns - stamp_ns_ > kLongGap_ns) state_.rate_radps = lasting(state_, state_.rate_radps);
     while (stamp_ns_ < stamp_ns) {
         const MotionState before = state_;
         const std::int64_t target = std::min(stamp_ns, stamp_ns_ + nanoseconds(kCovarianceStep_s));
@@ -110,6 +119,8 @@ void MotionFilter::predict(std::int64_t stamp_ns) {
         const int steps = std::max(1, static_cast<int>(std::ceil(dt / kPredictionStep_s)));
         const double h = dt / steps;
         for (int i = 0; i < steps; ++i) advance(state_, stamp_ns_ + nanoseconds((i + 0.5) * h), h);
+        const bool silent = imu_ != nullptr && imu_->is_silent_at(stamp_ns_ + (target - stamp_ns_) / 2);
+        silent_s_ = silent ? silent_s_ + dt : 0.0;
         grow_covariance(before, (state_.velocity_mps - before.velocity_mps) / dt, dt);
         stamp_ns_ = target;
     }
@@ -125,18 +136,28 @@ void MotionFilter::grow_covariance(const MotionState& before, const Eigen::Vecto
     };
     double velocity_density;
     if (imu_ != nullptr) {
-        const Eigen::Matrix3d force = skew(acceleration - before.gravity_mps2);
         F.block<3, 3>(kRotation, kRate) = -dt * R;
-        F.block<3, 3>(kVelocity, kRotation) = -dt * force;
-        F.block<3, 3>(kVelocity, kAccelerometerBias) = -dt * R;
-        F.block<3, 3>(kVelocity, kGravity).diagonal().setConstant(dt);
-        F.block<3, 3>(kPosition, kRotation) = -0.5 * dt * dt * force;
-        F.block<3, 3>(kPosition, kAccelerometerBias) = -0.5 * dt * dt * R;
-        F.block<3, 3>(kPosition, kGravity).diagonal().setConstant(0.5 * dt * dt);
+        if (silent_s_ == 0.0) {
+            const Eigen::Matrix3d force = skew(acceleration - before.gravity_mps2);
+            F.block<3, 3>(kVelocity, kRotation) = -dt * force;
+            F.block<3, 3>(kVelocity, kAccelerometerBias) = -dt * R;
+            F.block<3, 3>(kVelocity, kGravity).diagonal().setConstant(dt);
+            F.block<3, 3>(kPosition, kRotation) = -0.5 * dt * dt * force;
+            F.block<3, 3>(kPosition, kAccelerometerBias) = -0.5 * dt * dt * R;
+            F.block<3, 3>(kPosition, kGravity).diagonal().setConstant(0.5 * dt * dt);
+        }
         noise(kRotation, config_.gyro_noise);
         noise(kRate, config_.gyro_bias_walk);
         noise(kAccelerometerBias, config_.accelerometer_bias_walk);
         velocity_density = config_.accelerometer_noise;
+        if (silent_s_ > 0.0) {
+            // A turn rate that walks for that long: what this step adds.
+            const double before_s = std::max(0.0, silent_s_ - dt);
+            const double walked = silent_s_ * silent_s_ * silent_s_ - before_s * before_s * before_s;
+            Q.diagonal().segment<3>(kRotation).array() +=
+                config_.angular_acceleration * config_.angular_acceleration * walked / 3.0;
+            velocity_density = config_.acceleration;
+        }
     } else {
         F.block<3, 3>(kRotation, kRate) = dt * R;
         F.block<3, 3>(kVelocity, kRate) = -dt * skew(before.velocity_mps) * R;
@@ -291,6 +312,13 @@ void MotionFilter::forget_velocity() {
 void MotionFilter::set_motion(const Eigen::Vector3d& velocity_mps, const Eigen::Vector3d& rate_radps) {
     state_.velocity_mps = velocity_mps;
     state_.rate_radps = rate_radps;
+}
+
+void MotionFilter::move(const Eigen::Vector3d& offset_m, double turn_rad) {
+    const Eigen::Quaterniond turn(Eigen::AngleAxisd(turn_rad, Eigen::Vector3d::UnitZ()));
+    state_.position_m += offset_m;
+    state_.rotation = (turn * state_.rotation).normalized();
+    state_.velocity_mps = turn * state_.velocity_mps;
 }
 
 Eigen::Isometry3d MotionFilter::T_world_sensor() const {

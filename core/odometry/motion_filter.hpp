@@ -101,6 +101,8 @@ class MotionFilter {
     void forget_velocity();
     /// Replaces velocity and rate, with their uncertainty as it is.
     void set_motion(const Eigen::Vector3d& velocity_mps, const Eigen::Vector3d& rate_radps);
+    /// Moves the state, not its uncertainty: an offset in the world and a turn about its z axis.
+    void move(const Eigen::Vector3d& offset_m, double turn_rad);
     void set_gravity(const Eigen::Vector3d& gravity_mps2) { state_.gravity_mps2 = gravity_mps2; }
     Eigen::Isometry3d T_world_sensor() const;
     Eigen::Vector3d sensor_linear_velocity() const;   ///< sensor frame
@@ -114,6 +116,7 @@ class MotionFilter {
     std::int64_t stamp_ns() const { return stamp_ns_; }
 
   private:
+    static Eigen::Vector3d lasting(const MotionState& s, const Eigen::Vector3d& rate_radps);
     void advance(MotionState& s, std::int64_t mid_ns, double dt) const;
     Eigen::Vector3d body_rate(const MotionState& s, std::int64_t time_ns) const;
     void see_motion();
@@ -134,6 +137,7 @@ class MotionFilter {
     /// Without IMU: squared densities of the robot's acceleration and angular acceleration, as seen of late.
     double acceleration2_ = 0.0;
     double angular_acceleration2_ = 0.0;
+    double silent_s_ = 0.0;  ///< so long the IMU has said nothing, at the present stamp
     std::int64_t updated_ns_ = 0;
     std::int64_t stamp_ns_ = 0;
 };

@@ -12,6 +12,8 @@ constexpr double kClearlyBetter = 1.2;
 constexpr double kNearSmoothing = 0.2;
 // After so long without a registration the map is given up.
 constexpr double kLost_s = 2.0;
+// Looking around the prediction costs some frames' time.
+constexpr double kSearchEvery_s = 0.5;
 // Without a scan for longer than this there is no prediction worth the name.
 constexpr double kMaxGap_s = 5.0;
 constexpr double kStandardGravity_mps2 = 9.80665;
@@ -78,6 +80,13 @@ void Odometry::State::process(Frame& frame, const OdometryFeedback* feedback) {
         if (frame.header.usable && filter.uses_imu() && !bootstrapping) {
             const bool poor = !registered || static_cast<double>(near) < kPoorShare * usual_near;
             if (poor || !imu_is_consistent()) retry_without_imu(frame, before);
+        }
+        if (!registered && frame.header.usable && !bootstrapping) {
+            const double since_s = static_cast<double>(frame.header.stamp_ns - searched_ns) * 1e-9;
+            if (predicted_deviation_m() > config.max_deviation_m && since_s > kSearchEvery_s) {
+                searched_ns = frame.header.stamp_ns;
+                registered = find_again(frame);
+            }
         }
         // Two first scans that do not fit each other: one of them is no good, and which will be seen.
         const bool bad_start = bootstrapping && flat_points(frame) >= kMinFirstPoints;

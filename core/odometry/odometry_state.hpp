@@ -35,6 +35,8 @@ struct Odometry::State {
     static std::size_t taking_part(const PointSelection& points);
     static std::size_t flat_points(const Frame& frame);
     bool estimate(const Frame& frame);
+    void accept();
+    bool find_again(const Frame& frame);
     void choose_motion_model(const Frame& frame);
     bool imu_is_consistent();
     void retry_without_imu(const Frame& frame, const MotionFilter& before);
@@ -50,6 +52,7 @@ struct Odometry::State {
     bool first_scan_is_void() const;
     void place_provisional();
     bool is_trustworthy();
+    bool is_beside_its_map(const PointSelection& points) const;
     void see_uncertainty();
     Matrix6d prediction_covariance() const;
     void choose_origin();
@@ -84,6 +87,7 @@ struct Odometry::State {
     MotionState first_motion;        ///< while bootstrapping: that it was published with
     HeldDirections held;
     std::int64_t last_registered_ns = 0;
+    std::int64_t searched_ns = 0;           ///< stamp of the last search around the prediction
     Matrix6d from_scan = Matrix6d::Zero();  ///< covariance of the last registration, the map being right
     Matrix6d lag = Matrix6d::Zero();        ///< mean square of what the filter has not followed of late, without IMU
     Matrix6d from_map = Matrix6d::Zero();   ///< what the map's errors add where it is seen from elsewhere

@@ -10,8 +10,7 @@ namespace {
 
 // A direction with more than this share of the strongest one's information is not examined further.
 constexpr double kClearShare = 0.1;
-// A match faces a direction of translation from this cosine on, one of rotation from this share of its lever on.
-constexpr float kFacingCosine = 0.3F;
+// A match faces a direction of rotation from this share of its lever on.
 constexpr float kFacingLever = 0.1F;
 // As many facing matches make a direction observable. In a bare tunnel there is none; how much they say is weighed
 // against the prediction by their information.
@@ -28,7 +27,7 @@ float part_along(const PlaneMatches& matches, std::size_t i, int block, const Ei
 }
 
 bool faces(const PlaneMatches& matches, std::size_t i, int block, float along) {
-    return std::abs(along) > (block == 0 ? kFacingCosine : kFacingLever * matches.lever_m[i]);
+    return block == 0 ? Observability::is_facing(along) : std::abs(along) > kFacingLever * matches.lever_m[i];
 }
 
 }  // namespace

@@ -4,6 +4,8 @@
 // counts as evidence for a direction are therefore only matches that clearly face it.
 #pragma once
 
+#include <cmath>
+
 #include "core/registration/normal_equations.hpp"
 
 namespace dlod {
@@ -16,6 +18,9 @@ class Observability {
     /// Looks at matches and what they sum up to.
     /// @param demand how many times the usual number of facing matches makes a direction observable
     static Observability of(const PlaneMatches& matches, const NormalEquations& equations, double demand = 1.0);
+
+    /// A surface whose normal has this part along a direction of translation faces it.
+    static bool is_facing(float along) { return std::abs(along) > kFacingCosine; }
 
     /// Directions that next to no match faces: number of columns.
     int unobservable() const { return unobservable_; }
@@ -34,6 +39,8 @@ class Observability {
     void ask_prediction(PlaneMatches& matches, const Vector6d& change, const Matrix6d& covariance) const;
 
   private:
+    static constexpr float kFacingCosine = 0.3F;
+
     struct Weak {
         Eigen::Vector3f direction;
         int block;  ///< first row in (translation, rotation)

@@ -83,6 +83,28 @@ TEST_P(FirstFrame, ThatIsNearlyEmptyIsNotValid) {
 
 INSTANTIATE_TEST_SUITE_P(Odometry, FirstFrame, testing::Bool());
 
+class Gap : public testing::TestWithParam<bool> {};
+
+TEST_P(Gap, OfThreeSecondsEndsInTheSameMap) {
+    constexpr int kFrom = 15;
+    constexpr int kTo = 45;
+    SimulatedDrive drive(furnished_room(), [](double t) {
+        Eigen::Isometry3d T = drive_on(0.5 * t);
+        T.linear() = T.linear() * Eigen::AngleAxisd(0.04 * std::sin(9.0 * t), Eigen::Vector3d::UnitX());
+        return T;
+    });
+    OdometryConfig config;
+    config.use_imu = GetParam();
+    OdometryRun run(drive, config);
+    run.run(0, kFrom);
+    run.run(kTo, kTo + 15);
+    EXPECT_FALSE(run.any(kReinitialized));
+    EXPECT_TRUE(run.frames[kFrom].valid);
+    for (std::size_t i = 1; i < run.frames.size(); ++i) EXPECT_LT(run.position_error(i), 0.05) << i;
+}
+
+INSTANTIATE_TEST_SUITE_P(Odometry, Gap, testing::Bool());
+
 struct ClockStep {
     const char* name;
     double lidar_s;
