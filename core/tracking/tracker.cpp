@@ -28,6 +28,8 @@ constexpr double kSimilar = 1.5;           // ratio of footprint diagonals
 constexpr int kYoungHits = 10;
 constexpr double kBody_m = 1.2;           // people are no broader
 constexpr double kFree = 0.5;             // evidence of a part that stands where it was free
+constexpr double kAtRest = -0.9;          // evidence of what stands where something stood before
+constexpr double kMoreAtRest = 0.5;       // by that much of the evidence
 constexpr double kStackedOverlap = 0.25;  // share of the smaller height that two halves of one object have in common
 constexpr double kStackedShift_m = 0.4;   // and between their middles in the ground plane
 constexpr double kSameFootprint = 0.4;    // parts above one another share that much of the smaller footprint
@@ -66,6 +68,12 @@ bool is_limb_of(const TrackedObject& host, const TrackedObject& guest, const Det
 bool is_body_beside(const TrackedObject& host, const TrackedObject& guest) {
     return guest.state() == DynamicState::kDynamic && guest.hits() >= kYoungHits &&
            guest.box().size_m.z() > kLeastBody * host.box().size_m.z();
+}
+
+/// Larger than what is seen of the object, and more at rest than that: a wall that it comes near to.
+bool is_backdrop(const Detection& part, const CandidateDetection& of_part, const Detection& seen,
+                 const CandidateDetection& of_seen) {
+    return part.count > seen.count && of_part.motion <= kAtRest && of_part.motion + kMoreAtRest < of_seen.motion;
 }
 
 /// Whether a track that is seen may be the object of one that is not: what moves is not taken for something that rests,
@@ -268,6 +276,8 @@ void Tracker::State::attach_parts(Frame& frame) {
                                sets_off_with(host, detections[other], detections[d]));
             const bool covered = host.drives() && share_inside(detections[d].box, box, 0.0) > kInsideVehicle;
             if (!rest && !covered && candidates[d].motion * expected[t].motion < -0.2) continue;
+            if (!rest && !covered && is_backdrop(detections[d], candidates[d], detections[other], candidates[other]))
+                continue;
             if (!rest && !covered && host.state() != DynamicState::kDynamic && passes_by(d, other)) continue;
             if (height_gap_m(box, detections[d].box) > kMaxGap_m) continue;
             double reach = rest ? kLimbMargin_m : kPartMargin_m;

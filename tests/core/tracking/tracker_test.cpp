@@ -300,6 +300,28 @@ TEST_F(TrackerTest, AWalkerIsNoPartOfAHouseThatHePasses) {
 }
 
 // Evidence divides a slow object: part of it stands where it was, part where it was not.
+TEST_F(TrackerTest, AWallThatAPersonComesNearToIsNoPartOfHim) {
+    Tracker tracker(sensor, config);
+    for (int k = 0; k < 12; ++k) {
+        scene.next();
+        Detection& one = scene.add(person(4.0, 0.0));
+        one.free_points = k < 11 ? 0 : 35;  // of 120: he sets off
+        one.occupied_points = 120 - one.free_points;
+        one.average_residual_m = 0.02;
+        if (k == 11) {
+            Cylinder wall = person(4.1, 0.15);
+            wall.radius_m = 0.2;
+            wall.moving = false;
+            wall.points = 300;
+            scene.add(wall);
+        }
+        tracker.process(scene.frame);
+    }
+    const auto& detections = scene.frame.detection.detections;
+    ASSERT_GE(detections[0].track, 0);
+    EXPECT_NE(detections[0].track, detections[1].track);
+}
+
 TEST_F(TrackerTest, TheRestOfADividedObjectStaysPartOfIt) {
     Tracker tracker(sensor, config);
     for (int k = 0; k < 20; ++k) {
