@@ -299,7 +299,6 @@ TEST_F(TrackerTest, AWalkerIsNoPartOfAHouseThatHePasses) {
     }
 }
 
-// Evidence divides a slow object: part of it stands where it was, part where it was not.
 TEST_F(TrackerTest, AWallThatAPersonComesNearToIsNoPartOfHim) {
     Tracker tracker(sensor, config);
     for (int k = 0; k < 12; ++k) {
@@ -322,6 +321,7 @@ TEST_F(TrackerTest, AWallThatAPersonComesNearToIsNoPartOfHim) {
     EXPECT_NE(detections[0].track, detections[1].track);
 }
 
+// Evidence divides a slow object: part of it stands where it was, part where it was not.
 TEST_F(TrackerTest, TheRestOfADividedObjectStaysPartOfIt) {
     Tracker tracker(sensor, config);
     for (int k = 0; k < 20; ++k) {
