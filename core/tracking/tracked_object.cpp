@@ -180,7 +180,7 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
     cues.dt_s = unseen_s_;
     cues.position_m = filter_.box().center_m.head<2>();
     if (config.state.use_displacement && (watched_at_rest() || !clear_without_displacement(cues)))
-        displacement_cue(frame, sighting, shape.age_s, cues);
+        displacement_cue(frame, sighting, shape.age_s, config.state, cues);
     if (config.state.use_displacement && walked) cues.take_walked_way();
 
     ++hits_;
@@ -257,8 +257,9 @@ bool TrackedObject::rests_awhile() const {
 }
 
 bool TrackedObject::watched_at_rest() const {
-    if (rests_awhile() || set_off_.suspected()) return true;
-    return belief_.state() == DynamicState::kStatic && since_.age_s > kReference_s && is_body();
+    if (rests_awhile()) return true;
+    return belief_.state() == DynamicState::kStatic &&
+           (set_off_.suspected() || (since_.age_s > kReference_s && is_body()));
 }
 
 bool TrackedObject::clear_without_displacement(const MotionCues& cues) const {
@@ -271,7 +272,8 @@ bool TrackedObject::clear_without_displacement(const MotionCues& cues) const {
     return belief_.state() == DynamicState::kStatic && share < 0.05;
 }
 
-void TrackedObject::displacement_cue(const Frame& frame, const Sighting& sighting, double age_s, MotionCues& cues) {
+void TrackedObject::displacement_cue(const Frame& frame, const Sighting& sighting, double age_s,
+                                     const DynamicStateConfig& config, MotionCues& cues) {
     PointSample now;
     const Detection& part = frame.detection.detections[sighting.detections.front()];
     sample_points(frame, std::span(frame.detection.pixels).subspan(part.first, part.count), now);
@@ -293,8 +295,9 @@ void TrackedObject::displacement_cue(const Frame& frame, const Sighting& sightin
             cues.displacement_log_odds = std::min(cues.displacement_log_odds, 0.0);
         // Of what has never moved all has to speak for it: a wall seen through an opening seems to be displaced.
         const bool rests = rests_awhile() || (belief_.state() == DynamicState::kStatic && is_body());
-        cues.set_off = rests && set_off_.update(r, cues) &&
-                       (belief_.known_to_move() || (set_off_.left_its_place() && free_share(cues) > kEnters));
+        const MotionCues free_space = config.use_free_space ? cues : MotionCues();
+        cues.set_off = rests && set_off_.update(r, free_space) &&
+                       (belief_.known_to_move() || (set_off_.left_its_place() && free_share(free_space) > kEnters));
         const double length_m = r.displacement_m.norm();
         const auto agrees_with = [&](const Eigen::Vector2d& velocity_mps) {
             return (r.displacement_m - elapsed_s * velocity_mps).norm() < kAgreement * length_m;

@@ -89,7 +89,8 @@ class TrackedObject {
     bool watched_at_rest() const;
     /// Registers this frame's points to earlier ones, and renews those.
     /// @param age_s of the points before the stamp
-    void displacement_cue(const Frame& frame, const Sighting& sighting, double age_s, MotionCues& cues);
+    void displacement_cue(const Frame& frame, const Sighting& sighting, double age_s, const DynamicStateConfig& config,
+                          MotionCues& cues);
     /// Visible box of all parts at one yaw.
     static OrientedBox visible_box(const Frame& frame, const DetectionShapes& shapes, const Sighting& sighting,
                                    double yaw_rad);
