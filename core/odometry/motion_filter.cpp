@@ -18,6 +18,7 @@ constexpr int kGravity = 15;
 constexpr double kPredictionStep_s = 2.5e-3;
 constexpr double kCovarianceStep_s = 0.1;
 constexpr std::int64_t kLongGap_ns = 350'000'000;
+constexpr double kKnownPose = 1e-4;           // standard deviation of the pose that the world begins with: m, rad
 constexpr double kUnknownVelocity_mps = 3.0;  // standard deviation at the start
 // Without IMU: time over which the robot's accelerations are averaged.
 constexpr double kMotionMemory_s = 1.0;
@@ -44,13 +45,9 @@ void MotionFilter::initialize(const Eigen::Isometry3d& T_world_sensor, const Eig
     state_.position_m = T_world_body.translation();
     state_.gravity_mps2 = gravity_mps2;
     stamp_ns_ = stamp_ns;
-    covariance_.setZero();
-    const auto set = [&](int block, double deviation) {
-        covariance_.diagonal().segment<3>(block).setConstant(deviation * deviation);
-    };
-    set(kPosition, 1e-4);
-    set(kRotation, 1e-4);
-    set(kVelocity, kUnknownVelocity_mps);
+    forget(kPosition, kKnownPose);
+    forget(kRotation, kKnownPose);
+    forget(kVelocity, kUnknownVelocity_mps);
     imu_ = nullptr;
     use_imu(imu);
 }
@@ -64,19 +61,14 @@ void MotionFilter::use_imu(const ImuBuffer* imu) {
         state_.rate_radps.setZero();
     }
     imu_ = imu;
-    const auto set = [&](int block, double deviation) {
-        covariance_.middleRows<3>(block).setZero();
-        covariance_.middleCols<3>(block).setZero();
-        covariance_.diagonal().segment<3>(block).setConstant(deviation * deviation);
-    };
-    set(kRate, imu != nullptr ? 0.01 : 1.0);
+    forget(kRate, imu != nullptr ? 0.01 : 1.0);
     if (imu != nullptr) {
-        set(kAccelerometerBias, 0.05);
-        set(kGravity, 0.3);
+        forget(kAccelerometerBias, 0.05);
+        forget(kGravity, 0.3);
     } else {
         state_.accelerometer_bias_mps2.setZero();
-        set(kAccelerometerBias, std::sqrt(kFrozen));
-        set(kGravity, std::sqrt(kFrozen));
+        forget(kAccelerometerBias, std::sqrt(kFrozen));
+        forget(kGravity, std::sqrt(kFrozen));
     }
 }
 
@@ -282,6 +274,32 @@ void MotionFilter::observe_rest(const Eigen::Vector3d& direction) {
     covariance_ = 0.5 * (covariance_ + covariance_.transpose()).eval();
 }
 
+void MotionFilter::doubt_gravity(double deviation_mps2) {
+    forget(kGravity, deviation_mps2);
+}
+
+void MotionFilter::begin_world(const Eigen::Isometry3d& T_world_sensor, double gravity_deviation_mps2) {
+    const Eigen::Isometry3d T_world_body = T_world_sensor * T_body_sensor_.inverse();
+    const Eigen::Quaterniond rotation = Eigen::Quaterniond(T_world_body.rotation()).normalized();
+    const Eigen::Matrix3d R_new_old = (rotation * state_.rotation.conjugate()).toRotationMatrix();
+    state_.rotation = rotation;
+    state_.position_m = T_world_body.translation();
+    state_.velocity_mps = R_new_old * state_.velocity_mps;
+    state_.gravity_mps2 = MotionState{}.gravity_mps2;
+    covariance_.middleRows<3>(kVelocity) = (R_new_old * covariance_.middleRows<3>(kVelocity)).eval();
+    covariance_.middleCols<3>(kVelocity) = (covariance_.middleCols<3>(kVelocity) * R_new_old.transpose()).eval();
+    forget(kPosition, kKnownPose);
+    forget(kRotation, kKnownPose);
+    forget(kGravity, gravity_deviation_mps2);
+}
+
+/// What is known of this block is a standard deviation, and nothing that it has to do with others.
+void MotionFilter::forget(int block, double deviation) {
+    covariance_.middleRows<3>(block).setZero();
+    covariance_.middleCols<3>(block).setZero();
+    covariance_.diagonal().segment<3>(block).setConstant(deviation * deviation);
+}
+
 MotionFilter::Vector MotionFilter::correction() const {
     return difference(state_, prior_);
 }
@@ -304,9 +322,7 @@ void MotionFilter::apply(MotionState& s, const Vector& error) {
 }
 
 void MotionFilter::forget_velocity() {
-    covariance_.middleRows<3>(kVelocity).setZero();
-    covariance_.middleCols<3>(kVelocity).setZero();
-    covariance_.diagonal().segment<3>(kVelocity).setConstant(kUnknownVelocity_mps * kUnknownVelocity_mps);
+    forget(kVelocity, kUnknownVelocity_mps);
 }
 
 void MotionFilter::set_motion(const Eigen::Vector3d& velocity_mps, const Eigen::Vector3d& rate_radps) {

@@ -103,6 +103,11 @@ class MotionFilter {
     void set_motion(const Eigen::Vector3d& velocity_mps, const Eigen::Vector3d& rate_radps);
     /// Moves the state, not its uncertainty: an offset in the world and a turn about its z axis.
     void move(const Eigen::Vector3d& offset_m, double turn_rad);
+    /// Gravity is as it is believed to be to within this standard deviation, each axis.
+    void doubt_gravity(double deviation_mps2);
+    /// The same motion, seen from a new world, in which the sensor is here now and gravity points downwards.
+    /// @param gravity_deviation_mps2 standard deviation of that, each axis
+    void begin_world(const Eigen::Isometry3d& T_world_sensor, double gravity_deviation_mps2);
     void set_gravity(const Eigen::Vector3d& gravity_mps2) { state_.gravity_mps2 = gravity_mps2; }
     Eigen::Isometry3d T_world_sensor() const;
     Eigen::Vector3d sensor_linear_velocity() const;   ///< sensor frame
@@ -121,6 +126,7 @@ class MotionFilter {
     Eigen::Vector3d body_rate(const MotionState& s, std::int64_t time_ns) const;
     void see_motion();
     void grow_covariance(const MotionState& before, const Eigen::Vector3d& acceleration_world, double dt);
+    void forget(int block, double deviation);
     static Vector difference(const MotionState& a, const MotionState& b);
     static void apply(MotionState& s, const Vector& error);
 

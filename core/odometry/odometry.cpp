@@ -17,6 +17,16 @@ constexpr double kSearchEvery_s = 0.5;
 // Without a scan for longer than this there is no prediction worth the name.
 constexpr double kMaxGap_s = 5.0;
 constexpr double kStandardGravity_mps2 = 9.80665;
+// Started in motion: the acceleration that is in what the accelerometer feels, how well the level has to be known, and
+// from which scan on the motion is known well enough for a map.
+constexpr double kStartAcceleration_mps2 = 1.0;
+constexpr double kLevel_rad = 0.035;
+constexpr int kFirstGoodScan = 2;
+// Of what comes out as gravity: accelerometers are off by some hundredths of it.
+constexpr double kMaxGravityError_mps2 = 0.6;
+// A start that leaves more of the positions unexplained is tried again, so many times.
+constexpr double kMaxScatter = 1.0;
+constexpr int kMaxRetries = 3;
 // Where the robot may be after that: standard deviations.
 constexpr double kAway_m = 15.0;
 constexpr double kAway_rad = 1.0;
@@ -25,6 +35,14 @@ Matrix6d away() {
     Vector6d deviation;
     deviation << Eigen::Vector3d::Constant(kAway_m), Eigen::Vector3d::Constant(kAway_rad);
     return deviation.cwiseAbs2().asDiagonal();
+}
+
+/// The rotation that turns this direction of the sensor's frame upwards, and its x axis to yaw 0.
+Eigen::Matrix3d levelled(const Eigen::Vector3d& up) {
+    const Eigen::Vector3d left = up.cross(Eigen::Vector3d::UnitX()).normalized();
+    Eigen::Matrix3d R;
+    R << left.cross(up).normalized().transpose(), left.transpose(), up.normalized().transpose();
+    return R;
 }
 
 }  // namespace
@@ -101,6 +119,7 @@ void Odometry::State::process(Frame& frame, const OdometryFeedback* feedback) {
         write_nothing(frame);
         return;
     }
+    level(frame);
     update_sweep(frame);
     write_result(frame);
     if (registered) {
@@ -109,6 +128,66 @@ void Odometry::State::process(Frame& frame, const OdometryFeedback* feedback) {
         last_registered_ns = frame.header.stamp_ns;
         place_target(frame.prepared.points, excluded, filter.T_world_sensor());
     }
+}
+
+/// A robot that is in motion when it starts feels its acceleration beside gravity. Until the first scans show where
+/// down is no pose is to be used, and with the first one that is the world begins.
+void Odometry::State::level(const Frame& frame) {
+    if (level_known) return;
+    trusted = false;
+    if (!filter.uses_imu()) {
+        level_known = true;
+        return;
+    }
+    scans_since_start = just_started ? 0 : scans_since_start + (registered ? 1 : 0);
+    if (!registered || scans_since_start < kFirstGoodScan) return;
+    if (held.observability().unobservable() > 0) {
+        // What is held follows the accelerometer, and says nothing of it.
+        start_level.clear();
+        return;
+    }
+    // The scans before this one were deskewed for a motion that was not known yet.
+    if (scans_since_start == kFirstGoodScan) renew_map(frame);
+    start_level.add(filter.state(), frame.header.stamp_ns, imu);
+    const auto gravity = start_level.gravity();
+    if (!gravity || gravity->deviation_mps2 > kLevel_rad * kStandardGravity_mps2) return;
+    const bool is_gravity = std::abs(gravity->mps2.norm() - kStandardGravity_mps2) < kMaxGravityError_mps2;
+    if ((!is_gravity || gravity->scatter > kMaxScatter) && retries < kMaxRetries) {
+        // The accelerometer does not feel the motion that the lidar sees: it may have taken a crowd for the world.
+        ++retries;
+        restart(frame, Matrix6d::Zero());
+        return;
+    }
+    if (std::sqrt(gravity->scatter) * gravity->deviation_mps2 > kLevel_rad * kStandardGravity_mps2) return;
+    begin_world(frame, *gravity);
+    level_known = true;
+    trusted = true;
+}
+
+/// This scan is the map from now on.
+void Odometry::State::renew_map(const Frame& frame) {
+    keyframes.clear();
+    map_sequence = frame.header.sequence;
+    choose_origin();
+    update_sweep(frame);
+    place(frame.prepared.points, motion, placed);
+    place_provisional();
+}
+
+/// The world begins anew with this scan, level.
+void Odometry::State::begin_world(const Frame& frame, const StartLevel::Gravity& gravity) {
+    const Eigen::Isometry3d T_before = filter.T_world_sensor();
+    Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+    T.linear() = levelled(-(T_before.linear().transpose() * gravity.mps2));
+    filter.begin_world(T, gravity.deviation_mps2);
+    target_rotation = Eigen::Quaterniond(T.linear() * T_before.linear().transpose()) * target_rotation;
+    anchor.setZero();
+    start_covariance.setZero();
+    start_position_m.setZero();
+    world_sequence = frame.header.sequence;
+    just_started = true;
+    flags |= OdometryResult::kReinitialized;
+    renew_map(frame);
 }
 
 /// The prediction by the IMU may have misled the registration: does the lidar alone do better?
@@ -135,6 +214,7 @@ void Odometry::State::use_constant_velocity() {
 }
 
 void Odometry::State::apply(const OdometryFeedback& feedback) {
+    if (feedback.sequence < world_sequence) return;
     for (const OrientedBox& box : feedback.cleared) keyframes.remove_points(box);
     // One of before a restart is of another map.
     if (feedback.has_keyframe && feedback.sequence >= map_sequence) keyframes.add(feedback.keyframe);
@@ -184,16 +264,14 @@ void Odometry::State::start(const Frame& frame, const Eigen::Isometry3d& T_world
     const bool with_imu = monitor.usable() && !imu.empty();
     Eigen::Isometry3d T = T_world_sensor;
     if (!started && with_imu) {
-        // Level, with the sensor's x axis at yaw 0.
-        const Eigen::Vector3d up = sensor.T_sensor_imu.linear() * mean_force(frame);
-        const Eigen::Vector3d left = up.cross(Eigen::Vector3d::UnitX()).normalized();
-        Eigen::Matrix3d R;
-        R << left.cross(up).transpose(), left.transpose(), up.transpose();
-        T.linear() = R;
+        T.linear() = levelled(sensor.T_sensor_imu.linear() * mean_force(frame));
+        level_known = monitor.quiet();
     }
     const Eigen::Vector3d gravity =
         started ? filter.state().gravity_mps2 : Eigen::Vector3d(0.0, 0.0, -kStandardGravity_mps2);
     filter.initialize(T, gravity, frame.header.stamp_ns, with_imu ? &imu : nullptr);
+    if (with_imu && !level_known) filter.doubt_gravity(kStartAcceleration_mps2);
+    start_level.clear();
     if (with_imu && monitor.quiet()) {
         for (int axis = 0; axis < 3; ++axis) filter.observe_rest(Eigen::Vector3d::Unit(axis));
     }

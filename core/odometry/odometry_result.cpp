@@ -42,7 +42,7 @@ void Odometry::State::write_result(Frame& frame) {
     out.residual_cap_m = static_cast<float>(config.scan_to_submap.residual_cap_m);
     // A first scan has been deskewed without its velocity: it is no keyframe.
     out.void_scan_ns = void_scan_ns;
-    out.keyframe = registered && !bootstrapping && keyframes.is_due(out.T_world_sensor, range_m);
+    out.keyframe = registered && trusted && !bootstrapping && keyframes.is_due(out.T_world_sensor, range_m);
     if (!out.keyframe) return;
     keyframes.announce(out.T_world_sensor, out.covariance);
     write_keyframe_points(frame);

@@ -15,6 +15,7 @@
 #include "core/odometry/motion_filter.hpp"
 #include "core/odometry/moving_points.hpp"
 #include "core/odometry/odometry.hpp"
+#include "core/odometry/start_level.hpp"
 #include "core/registration/placed_points.hpp"
 #include "core/registration/scan_to_scan.hpp"
 #include "core/registration/scan_to_submap.hpp"
@@ -51,6 +52,9 @@ struct Odometry::State {
     double fit() const;
     bool first_scan_is_void() const;
     void place_provisional();
+    void level(const Frame& frame);
+    void renew_map(const Frame& frame);
+    void begin_world(const Frame& frame, const StartLevel::Gravity& gravity);
     bool is_trustworthy();
     bool is_beside_its_map(const PointSelection& points) const;
     void see_uncertainty();
@@ -79,12 +83,17 @@ struct Odometry::State {
     MovingPoints moving;
 
     bool started = false;
-    std::uint64_t map_sequence = 0;  ///< of the frame that the map began with
-    bool bootstrapping = false;      ///< the map is one scan that has not been deskewed for its velocity
-    MotionFilter first_filter;       ///< while bootstrapping: at the stamp of that scan
-    PointSelection first_points;     ///< while bootstrapping: of that scan
-    double first_duration_s = 0.0;   ///< while bootstrapping: of that scan
-    MotionState first_motion;        ///< while bootstrapping: that it was published with
+    std::uint64_t world_sequence = 0;  ///< of the frame that the world began with
+    std::uint64_t map_sequence = 0;    ///< of the frame that the map began with
+    bool bootstrapping = false;        ///< the map is one scan that has not been deskewed for its velocity
+    MotionFilter first_filter;         ///< while bootstrapping: at the stamp of that scan
+    PointSelection first_points;       ///< while bootstrapping: of that scan
+    double first_duration_s = 0.0;     ///< while bootstrapping: of that scan
+    MotionState first_motion;          ///< while bootstrapping: that it was published with
+    bool level_known = true;           ///< false: in motion since it started, and where down is does not show yet
+    int scans_since_start = 0;         ///< registered ones, while the level is not known
+    int retries = 0;                   ///< of the start, because it did not fit the accelerometer
+    StartLevel start_level;
     HeldDirections held;
     std::int64_t last_registered_ns = 0;
     std::int64_t searched_ns = 0;           ///< stamp of the last search around the prediction

@@ -84,7 +84,7 @@ struct OdometryResult {
         kImuUsed = 1U << 0,         ///< rotation and gravity came from the IMU
         kDegenerate = 1U << 1,      ///< at least one direction was not observable and is held by prediction
         kPredictedOnly = 1U << 2,   ///< too few columns or no convergence: the pose is the prediction
-        kReinitialized = 1U << 3,   ///< recovered after it was lost
+        kReinitialized = 1U << 3,   ///< a new map: after it was lost, or with the first pose once the level is known
         kImuFaulty = 1U << 4,       ///< the IMU is there but absurd and is not used
         kStarted = 1U << 5,         ///< the world frame begins anew: first frame of a run, or after a restart
     };

@@ -1,7 +1,9 @@
 // The odometry over a simulated drive, with the feedback that removal would give.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "core/map/keyframe_cloud.hpp"
@@ -52,8 +54,20 @@ class OdometryRun {
     }
     const Frame& frame() const { return frame_; }
 
-    /// Distance between true and estimated position relative to the first frame's pose, metres.
-    double position_error(std::size_t i) const { return relative_error(0, i).translation().norm(); }
+    /// Distance between true and estimated position relative to the first valid pose, metres.
+    double position_error(std::size_t i) const { return relative_error(first_valid(), i).translation().norm(); }
+    std::size_t first_valid() const {
+        std::size_t first = 0;
+        while (first < frames.size() && !frames[first].valid) ++first;
+        return first < frames.size() ? first : 0;
+    }
+    /// Angle between the true vertical and the world's of a frame's pose, rad.
+    double tilt(std::size_t i) const {
+        const auto up = [](const Eigen::Isometry3d& T) {
+            return (T.rotation().transpose() * Eigen::Vector3d::UnitZ());
+        };
+        return std::acos(std::min(1.0, up(frames[i].truth).dot(up(frames[i].estimate))));
+    }
     double largest_position_error(std::size_t first = 0) const {
         double largest = 0.0;
         for (std::size_t i = first; i < frames.size(); ++i) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <random>
@@ -20,6 +21,12 @@ struct SceneBox {
 
 /// Pose of the sensor in the world at a time in seconds.
 using Trajectory = std::function<Eigen::Isometry3d(double)>;
+
+/// Time on the way of a robot that stands for half a second and then takes another one to get up to speed.
+inline double after_rest(double time_s) {
+    const double u = std::max(0.0, time_s - 0.5);
+    return u < 1.0 ? 0.5 * u * u : u - 0.5;
+}
 
 struct DriveOptions {
     int height = 32;

@@ -12,7 +12,8 @@ namespace dlod::test {
 namespace {
 
 /// To and fro, so that after a while everything has been seen.
-Eigen::Isometry3d to_and_fro(double t) {
+Eigen::Isometry3d to_and_fro(double time_s) {
+    const double t = after_rest(time_s);
     return make_pose(so3_exp({0.0, 0.0, 0.1 * std::sin(1.5 * t)}), {0.2 * std::sin(2.0 * t), 0.0, 0.0});
 }
 

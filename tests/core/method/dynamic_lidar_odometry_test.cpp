@@ -13,7 +13,7 @@ namespace dlod::test {
 namespace {
 
 Eigen::Isometry3d loop(double t) {
-    const double a = 0.7 * t / 2.5;
+    const double a = 0.7 * after_rest(t) / 2.5;
     return make_pose(so3_exp({0.0, 0.0, a}), {2.5 * std::sin(a), 2.5 * (1.0 - std::cos(a)) - 1.0, 0.0});
 }
 

@@ -1,10 +1,9 @@
 // The whole method from frame to frame: what a restart forgets, and what it does not.
-#include "core/dynamic_lidar_odometry.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cstring>
 
+#include "core/dynamic_lidar_odometry.hpp"
 #include "tests/support/simulated_drive.hpp"
 
 namespace dlod {

@@ -14,7 +14,8 @@ namespace dlod::test {
 namespace {
 
 /// To and fro, so that after a while everything has been seen.
-Eigen::Isometry3d to_and_fro(double t) {
+Eigen::Isometry3d to_and_fro(double time_s) {
+    const double t = after_rest(time_s);
     Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
     T.translation() = Eigen::Vector3d(0.4 * std::sin(2.0 * t), 0.0, 0.0);
     T.linear() = Eigen::AngleAxisd(0.3 * std::sin(1.5 * t), Eigen::Vector3d::UnitZ()).toRotationMatrix();

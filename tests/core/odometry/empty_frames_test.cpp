@@ -25,7 +25,8 @@ void spoil(OdometryResult& result) {
 
 // Frames come from a pool: which one it is depends on the threads, and what is published must not.
 TEST(EmptyFrames, HoldNothingOfTheFrameThatWasThereBefore) {
-    SimulatedDrive drive(furnished_room(), [](double t) {
+    SimulatedDrive drive(furnished_room(), [](double time_s) {
+        const double t = after_rest(time_s);
         return make_pose(so3_exp({0.0, 0.0, 0.2 * t}), {0.5 * t, 0.0, 0.0});
     });
     drive.column_arrives = [](int k, int) { return k != 0 && k != 9; };

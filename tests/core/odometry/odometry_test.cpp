@@ -96,6 +96,7 @@ TEST_P(MovingStart, FindsItsVelocityFromTheSecondFrameOn) {
     run.run(0, 25);
     EXPECT_LT(run.largest_position_error(), 0.04);
     EXPECT_NEAR(run.frames[2].linear_velocity.norm(), 3.0, 0.1);
+    EXPECT_TRUE(run.frames.back().valid);
 }
 
 TEST_P(MovingStart, FindsSixMetresASecondToo) {

@@ -7,9 +7,9 @@
 namespace dlod::test {
 namespace {
 
-/// A loop of 2.5 m radius at 1 m/s.
+/// A loop of 2.5 m radius at 1 m/s, after a rest.
 Eigen::Isometry3d loop(double t) {
-    const double a = t / 2.5;
+    const double a = after_rest(t) / 2.5;
     return make_pose(so3_exp({0.0, 0.0, a}), {2.5 * std::sin(a), 2.5 * (1.0 - std::cos(a)) - 1.0, 0.0});
 }
 
