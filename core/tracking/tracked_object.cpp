@@ -314,8 +314,8 @@ void TrackedObject::displacement_cue(const Frame& frame, const Sighting& sightin
         if (agreeing_ >= kTrustedFrames && filter_.box().size_m.head<2>().norm() > kLarge_m)
             filter_.update_velocity(registered_velocity_mps_, velocity_covariance(r, elapsed_s));
     }
-    const bool suspected = belief_.state() == DynamicState::kStatic && set_off_.suspected();
-    if (!suspected && (since_.age_s > kReference_s || (center - since_center_m_).norm() > kReference_m)) {
+    const bool sets_off = belief_.known_to_move() && belief_.state() == DynamicState::kStatic && set_off_.suspected();
+    if (!sets_off && (since_.age_s > kReference_s || (center - since_center_m_).norm() > kReference_m)) {
         before_ = since_;
         before_center_m_ = since_center_m_;
         since_ = now;
