@@ -61,14 +61,15 @@ class LiveRun {
     /// A clean stop, within the time that is asked of it.
     void stop() {
         daemon->signal(SIGTERM);
-        // Frames that are being worked on are finished: under ThreadSanitizer alone that may take longer.
+        // Frames that are being worked on are finished: under a sanitizer alone that may take longer.
         const auto most = kTooSlowForTimes ? 20s : 2s;
         EXPECT_EQ(daemon->wait(most), 0) << "a clean stop within two seconds\n" << daemon->output();
         EXPECT_TRUE(systemd.wait_for("STOPPING=1", 1s));
     }
 
     static bool eventually(std::chrono::milliseconds timeout, const std::function<bool()>& condition) {
-        return LiveSubscriber::wait_until(timeout, condition);
+        // What holds at last is waited for: where all is slow, longer.
+        return LiveSubscriber::wait_until(kTooSlowForTimes ? 4 * timeout : timeout, condition);
     }
     /// Forgets the poses so far and waits for `count` valid ones.
     bool poses_flow(std::size_t count = 5, std::chrono::milliseconds timeout = 15s) {

@@ -18,7 +18,7 @@ namespace {
 using namespace std::chrono_literals;
 using test::content;
 
-/// Under ThreadSanitizer a small sensor that turns ten times slower.
+/// Under a sanitizer a small sensor that turns ten times slower.
 constexpr bool kSmall = test::kTooSlowForTimes;
 constexpr std::size_t kFrames = kSmall ? 12 : 40;
 constexpr std::size_t kPacketsPerFrame = kSmall ? 32 : 64;
@@ -50,7 +50,6 @@ void expect_same_by_replay(const std::filesystem::path& recording, const std::fi
 }
 
 TEST(Live, NoFrameIsLostFromPacketToSubscriberAndTheRecordingGivesTheSame) {
-    if (test::leaves_out_small_forms()) GTEST_SKIP() << "set DLOD_TEST_SMALL_FORMS to run it";
 #ifndef DLOD_SIM_BINARY
     GTEST_SKIP() << "the simulator is not built";
 #else

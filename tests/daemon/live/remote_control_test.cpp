@@ -4,6 +4,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <bot_core/pose_t.hpp>
 #include <chrono>
@@ -34,11 +35,11 @@ using namespace std::chrono_literals;
 /// A port of its own: LCM hears every multicast group on its port.
 constexpr const char* kUrl = "udpm://239.255.76.97:17669?ttl=0";
 
-/// Under ThreadSanitizer all takes longer: the drive is sent slower and cut short, answers are waited for.
+/// Under a sanitizer all takes longer: the drive is sent slower and cut short, answers are waited for.
 constexpr bool kSmall = test::kTooSlowForTimes;
 constexpr int kSlower = kSmall ? 10 : 1;
 constexpr int kFrames = kSmall ? 40 : 80;
-constexpr std::size_t kFramesBefore = kSmall ? 8 : 25;  ///< the first command
+constexpr std::size_t kFramesBefore = kSmall ? 15 : 25;  ///< the first command
 
 int loopback_socket(std::uint16_t port) {
     const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
@@ -187,7 +188,6 @@ std::map<std::string, std::int64_t> counters_of(const status_t& status) {
 }
 
 TEST(RemoteControl, ALiveRunDoesWhatItIsToldAndTellsWhatPlannersNeed) {
-    if (test::leaves_out_small_forms()) GTEST_SKIP() << "set DLOD_TEST_SMALL_FORMS to run it";
     const test::TemporaryFolder folder;
     if (!test::enter_network_namespace()) GTEST_LOG_(INFO) << "no namespace of its own: on the host's loopback";
     Operator op;
@@ -252,7 +252,7 @@ TEST(RemoteControl, ALiveRunDoesWhatItIsToldAndTellsWhatPlannersNeed) {
     std::this_thread::sleep_for(kSlower * 1200ms);
     const std::size_t sent = sensor.stop();
     daemon.signal(SIGTERM);
-    EXPECT_EQ(daemon.wait(2s), 0) << daemon.output();
+    EXPECT_EQ(daemon.wait(kSmall ? 20s : 2s), 0) << daemon.output();
     op.stop();
 
     std::vector<std::size_t> starts;
@@ -272,8 +272,11 @@ TEST(RemoteControl, ALiveRunDoesWhatItIsToldAndTellsWhatPlannersNeed) {
     EXPECT_EQ(op.sensors[0].serial_number, "123456");
     EXPECT_EQ(op.sensors[0].rows, test::SyntheticCapture::kRows);
     ASSERT_GE(op.obstacles.size(), kSmall ? 6U : 15U);
-    EXPECT_GT(op.obstacles[4].count, 300);  // the last one is of what had arrived of a frame at the stop
-    EXPECT_EQ(op.obstacles[1].sequence - op.obstacles[0].sequence, 2);
+    EXPECT_GT(op.obstacles[4].count, 300);   // the last one is of what had arrived of a frame at the stop
+    std::int64_t smallest_step = INT64_MAX;  // a busy machine drops frames, which makes larger ones
+    for (std::size_t i = 1; i < op.obstacles.size(); ++i)
+        smallest_step = std::min(smallest_step, op.obstacles[i].sequence - op.obstacles[i - 1].sequence);
+    EXPECT_EQ(smallest_step, 2);
     ASSERT_GE(op.bot_core_poses.size(), kFramesBefore + 5);
     EXPECT_EQ(op.bot_core_poses.back().utime, op.poses.back().utime);
     EXPECT_EQ(op.bot_core_poses.back().pos[0], op.poses.back().position[0]);

@@ -37,7 +37,7 @@ TEST(SensorChanges, AwaitedUnpluggedRestartedAndReplaced) {
 
     sensor.plug_in();
     EXPECT_TRUE(run.poses_flow());
-    // A frame dropped on a busy machine is remembered for ten seconds; under ThreadSanitizer, some always are.
+    // A frame dropped on a busy machine is remembered for ten seconds; under a sanitizer, some always are.
     EXPECT_TRUE(test::kTooSlowForTimes || run.status_says(health(status_t::OK, ""), 25s));
 
     sensor.restart();

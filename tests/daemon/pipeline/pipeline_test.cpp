@@ -233,7 +233,6 @@ class ImpatientSource final : public driver::PacketSource {
 };
 
 TEST_F(PipelineTest, LiveTheNewestFramesWinAndEveryDropIsCounted) {
-    if (test::leaves_out_small_forms()) GTEST_SKIP() << "set DLOD_TEST_SMALL_FORMS to run it";
     const test::SyntheticCapture capture(60);
     ImpatientSource source(capture);
     std::vector<std::uint64_t> written;
@@ -266,7 +265,7 @@ TEST_F(PipelineTest, LiveTheNewestFramesWinAndEveryDropIsCounted) {
 }
 
 TEST_F(PipelineTest, LiveWithHalfTheTimeItNeedsLatencyIsBounded) {
-    if (test::kTooSlowForTimes) GTEST_SKIP() << "ThreadSanitizer is too slow for this";
+    if (test::kTooSlowForTimes) GTEST_SKIP() << "a sanitizer is too slow for this";
     driver::PacedSource source(std::make_unique<driver::PcapSource>(capture_), 1.0);
     std::vector<float> latencies_ms;
     test::CpuWait cpu_wait;
