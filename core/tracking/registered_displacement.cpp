@@ -27,6 +27,7 @@ constexpr double kMaxFit_m = 0.06;   // a worse fit than that is none
 constexpr double kMaxLogOdds = 1.5;  // one registration is no proof
 constexpr std::size_t kMinPoints = 10;
 constexpr double kAcceleration_mps2 = 2.0;  // of objects
+constexpr double kSameSide = 0.77;          // cosine of 40 degrees
 
 /// Horizontal normal at a pixel from its neighbours to the right and below (or left and above).
 bool normal_at(const Frame& frame, PixelIndex pixel, Eigen::Vector3f& normal) {
@@ -161,6 +162,11 @@ void sample_points(const Frame& frame, std::span<const PixelIndex> pixels, Point
         out.nx[i] = n.x() / level;
         out.ny[i] = n.y() / level;
     }
+}
+
+bool show_same_side(const PointSample& before, const PointSample& now, const Eigen::Vector2d& place_m) {
+    const auto view = [&place_m](const PointSample& s) { return (place_m - s.origin_m.head<2>()).normalized(); };
+    return view(before).dot(view(now)) > kSameSide;
 }
 
 RegisteredDisplacement register_displacement(const PointSample& before, const PointSample& now,

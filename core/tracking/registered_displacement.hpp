@@ -39,6 +39,10 @@ struct RegisteredDisplacement {
     int points = 0;                                     ///< so many do
 };
 
+/// Whether two samples show the same side of what stands at a place: they were seen from directions less than 40
+/// degrees apart. What is passed by closely turns another side to the sensor, which seems displaced.
+bool show_same_side(const PointSample& before, const PointSample& now, const Eigen::Vector2d& place_m);
+
 /// Registers `now` to `before` by translation in the ground plane.
 /// @param guess_m where to start beside "stayed"
 RegisteredDisplacement register_displacement(const PointSample& before, const PointSample& now,

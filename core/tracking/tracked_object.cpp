@@ -297,7 +297,8 @@ void TrackedObject::displacement_cue(const Frame& frame, const Sighting& sightin
         const bool rests = rests_awhile() || (belief_.state() == DynamicState::kStatic && is_body());
         const MotionCues free_space = config.use_free_space ? cues : MotionCues();
         cues.set_off = rests && set_off_.update(r, free_space) &&
-                       (belief_.known_to_move() || (set_off_.left_its_place() && free_share(free_space) > kEnters));
+                       (belief_.known_to_move() || (show_same_side(before_, now, center) && set_off_.left_its_place() &&
+                                                    free_share(free_space) > kEnters));
         const double length_m = r.displacement_m.norm();
         const auto agrees_with = [&](const Eigen::Vector2d& velocity_mps) {
             return (r.displacement_m - elapsed_s * velocity_mps).norm() < kAgreement * length_m;

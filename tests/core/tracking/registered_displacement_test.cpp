@@ -108,5 +108,14 @@ TEST(RegisteredDisplacement, TooFewPointsSayNothing) {
     EXPECT_EQ(displacement_log_odds(r, 1.0), 0.0);
 }
 
+TEST(RegisteredDisplacement, WhatIsPassedByCloselyShowsAnotherSide) {
+    PointSample before, now;
+    now.origin_m = {2.0, 0.0, 1.0};
+    EXPECT_TRUE(show_same_side(before, now, {20.0, 5.0}));    // far ahead
+    EXPECT_TRUE(show_same_side(before, now, {1.0, 5.0}));     // 23 degrees
+    EXPECT_FALSE(show_same_side(before, now, {1.0, 1.5}));    // 67 degrees
+    EXPECT_TRUE(show_same_side(before, before, {0.5, 0.5}));  // of a robot that stands
+}
+
 }  // namespace
 }  // namespace dlod
