@@ -261,7 +261,11 @@ TEST_F(PipelineTest, LiveTheNewestFramesWinAndEveryDropIsCounted) {
     EXPECT_EQ(pipeline.ingest().emitted_frames() + without_frame, 60U);
     EXPECT_TRUE(std::is_sorted(written.begin(), written.end()));
     EXPECT_EQ(written.back() + 1, pipeline.ingest().emitted_frames()) << "the newest frame must not be dropped";
-    EXPECT_EQ(imu_samples, imu_packets) << "the samples of dropped frames go on with the next ones";
+    // Those of turns that found no frame at all go on with the next frame, if one comes and they are not too many.
+    EXPECT_LE(imu_samples, imu_packets);
+    if (without_frame == 0) {
+        EXPECT_EQ(imu_samples, imu_packets) << "the samples of dropped frames go on with the next ones";
+    }
 }
 
 TEST_F(PipelineTest, LiveWithHalfTheTimeItNeedsLatencyIsBounded) {
