@@ -58,7 +58,6 @@ constexpr double kMaxWidening = 3.0;
 // IMU is no judge.
 constexpr double kSettling_s = 3.0;
 constexpr double kLagSmoothing = 0.1;
-constexpr double kClockOffset_s = 1e-3;
 
 bool converged(const Vector6d& step) {
     return step.head<3>().norm() < kStopTranslation_m && step.tail<3>().norm() < kStopRotation_rad;

@@ -35,36 +35,47 @@ int ImuBuffer::add(std::span<const ImuSample> samples) {
     for (const ImuSample& s : samples) {
         if (!plausible(s)) continue;
         if (count_ > 0 && s.stamp_ns < newest_ns() - kClockStep_ns) clear();
-        if (count_ > 0 && s.stamp_ns <= newest_ns()) continue;
-        if (count_ == kCapacity) {
-            first_ = (first_ + 1) % kCapacity;
-            --count_;
+        if (count_ > 0 && s.stamp_ns <= (doubtful_ ? doubtful_->stamp_ns : newest_ns())) continue;
+        const Stored sample{s.stamp_ns, {s.angular_velocity_radps.cast<double>(), s.acceleration_mps2.cast<double>()}};
+        if (doubtful_) {
+            // A spike stands out from the one before it and from the next one, which agree.
+            const Reading& before = stored(count_ - 1).reading;
+            const double jump = excess(before, doubtful_->reading);
+            const double back = excess(doubtful_->reading, sample.reading);
+            if (std::min(jump, back) < 2.0 * excess(before, sample.reading)) {
+                store(*doubtful_);
+                ++taken;
+            }
+            doubtful_.reset();
         }
-        const Reading reading{s.angular_velocity_radps.cast<double>(), s.acceleration_mps2.cast<double>()};
-        if (last_is_spike(reading)) {
-            --count_;
-            --taken;
+        if (count_ > 0 && excess(stored(count_ - 1).reading, sample.reading) > 1.0) {
+            doubtful_ = sample;
+            continue;
         }
-        samples_[(first_ + count_) % kCapacity] = {s.stamp_ns, reading};
-        ++count_;
+        store(sample);
         ++taken;
     }
     return taken;
 }
 
-/// The newest sample stands out from the one before it and from the next one, which agree.
-bool ImuBuffer::last_is_spike(const Reading& next) const {
-    if (count_ < 2) return false;
-    const Reading& last = stored(count_ - 1).reading;
-    const Reading& before = stored(count_ - 2).reading;
-    const auto stands_out = [](const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
-                               double bound) {
-        const double jump = std::min((b - a).norm(), (b - c).norm());
-        return jump > bound && (c - a).norm() < 0.5 * jump;
-    };
-    return stands_out(before.angular_velocity_radps, last.angular_velocity_radps, next.angular_velocity_radps,
-                      kSpike_radps) ||
-           stands_out(before.acceleration_mps2, last.acceleration_mps2, next.acceleration_mps2, kSpike_mps2);
+void ImuBuffer::clear() {
+    count_ = 0;
+    doubtful_.reset();
+}
+
+void ImuBuffer::store(const Stored& sample) {
+    if (count_ == kCapacity) {
+        first_ = (first_ + 1) % kCapacity;
+        --count_;
+    }
+    samples_[(first_ + count_) % kCapacity] = sample;
+    ++count_;
+}
+
+/// How far apart two samples are; beyond 1 the second one has to be borne out by a third.
+double ImuBuffer::excess(const Reading& a, const Reading& b) {
+    return std::max((b.angular_velocity_radps - a.angular_velocity_radps).norm() / kSpike_radps,
+                    (b.acceleration_mps2 - a.acceleration_mps2).norm() / kSpike_mps2);
 }
 
 Eigen::Vector3d ImuBuffer::turn(std::int64_t from_ns, std::int64_t to_ns) const {

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "core/types/imu_sample.hpp"
@@ -22,7 +23,7 @@ class ImuBuffer {
 
     /// @return number of samples that were taken over
     int add(std::span<const ImuSample> samples);
-    void clear() { count_ = 0; }
+    void clear();
     /// Mean angular velocity times time from one moment to another, rad.
     Eigen::Vector3d turn(std::int64_t from_ns, std::int64_t to_ns) const;
     bool empty() const { return count_ == 0; }
@@ -44,11 +45,13 @@ class ImuBuffer {
         Reading reading;
     };
     const Stored& stored(std::size_t i) const { return samples_[(first_ + i) % kCapacity]; }
-    bool last_is_spike(const Reading& next) const;
+    void store(const Stored& sample);
+    static double excess(const Reading& a, const Reading& b);
 
     std::array<Stored, kCapacity> samples_;
     std::size_t first_ = 0;
     std::size_t count_ = 0;
+    std::optional<Stored> doubtful_;  ///< the newest sample, which stands out: a spike, or a shock
 };
 
 }  // namespace dlod

@@ -1,6 +1,7 @@
 #include "core/odometry/imu_monitor.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace dlod {
 namespace {
@@ -13,12 +14,16 @@ constexpr double kMaxRefusedShare = 0.1;
 constexpr int kMaxWaitFrames = 640;
 // A correction beyond both the deviation and the absolute bound is impossible; a smaller one is suspicious and adds up.
 constexpr double kImpossibleDeviations = 10.0;
+// The lidar sees a position directly: less is needed.
+constexpr double kImpossiblePosition_m = 0.05;
+constexpr double kPositionDeviations = 4.0;
 constexpr double kImpossibleRotation_rad = 0.03;
 constexpr double kImpossibleVelocity_mps = 1.0;
 constexpr double kSuspiciousShare = 0.25;
 constexpr double kDisagreementLimit = 4.0;
 constexpr double kDisagreementDecay = 0.8;
 constexpr double kMaxTurnDifference_rad = 0.01;
+constexpr double kMaxForceDifference_mps2 = 2.0;
 // At rest: the mean turn rate is a bias, and what is around the means is the IMU's own noise.
 constexpr float kQuietRate_radps = 0.02F;
 constexpr float kQuietRateNoise_radps = 0.01F;
@@ -87,23 +92,28 @@ void ImuMonitor::see_rest(std::span<const ImuSample> samples) {
     rest_force_mps2_ += (force - rest_force_mps2_) / static_cast<float>(quiet_frames_);
 }
 
-bool ImuMonitor::see_correction(const Eigen::Vector3d& rotation_rad, double rotation_deviation_rad,
-                                const Eigen::Vector3d& velocity_mps, double velocity_deviation_mps) {
+bool ImuMonitor::see_correction(const Correction& c) {
     // 1: at the bound of what is possible.
-    const double rotation = std::min(rotation_rad.norm() / kImpossibleRotation_rad,
-                                     rotation_rad.norm() / (kImpossibleDeviations * rotation_deviation_rad));
-    const double velocity = std::min(velocity_mps.norm() / kImpossibleVelocity_mps,
-                                     velocity_mps.norm() / (kImpossibleDeviations * velocity_deviation_mps));
+    const auto share = [](double correction, double impossible, double deviations, double deviation) {
+        return std::min(correction / impossible, correction / (deviations * deviation));
+    };
+    const double position = share(c.position_m, kImpossiblePosition_m, kPositionDeviations, c.position_deviation_m);
+    const double rotation =
+        share(c.rotation_rad, kImpossibleRotation_rad, kImpossibleDeviations, c.rotation_deviation_rad);
+    const double velocity =
+        share(c.velocity_mps, kImpossibleVelocity_mps, kImpossibleDeviations, c.velocity_deviation_mps);
     const double worst = std::max(rotation, velocity);
     disagreement_ = kDisagreementDecay * disagreement_ + (worst > kSuspiciousShare ? worst : 0.0);
-    if (worst <= 1.0 && disagreement_ <= kDisagreementLimit) return true;
+    if (std::max(worst, position) <= 1.0 && disagreement_ <= kDisagreementLimit) return true;
     fail();
     return false;
 }
 
-void ImuMonitor::see_turns(const Eigen::Vector3d& gyro_rad, const Eigen::Vector3d& lidar_rad) {
+void ImuMonitor::see_motion(const Eigen::Vector3d& turn_difference_rad, double force_difference_mps2) {
     if (!faulty_) return;
-    clean_frames_ = clean_ && (gyro_rad - lidar_rad).norm() < kMaxTurnDifference_rad ? clean_frames_ + 1 : 0;
+    const bool agrees = turn_difference_rad.norm() < kMaxTurnDifference_rad &&
+                        std::abs(force_difference_mps2) < kMaxForceDifference_mps2;
+    clean_frames_ = clean_ && agrees ? clean_frames_ + 1 : 0;
     if (clean_frames_ >= wait_frames_) faulty_ = false;
 }
 

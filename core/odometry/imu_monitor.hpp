@@ -19,11 +19,16 @@ class ImuMonitor {
     /// @param taken how many of them the buffer accepted
     void see_samples(std::span<const ImuSample> samples, int taken, std::int64_t newest_ns, std::int64_t stamp_ns);
     /// How far the lidar's solution was from the prediction by the IMU, and how far the prediction thought it might be.
+    struct Correction {
+        double position_m = 0.0, position_deviation_m = 1.0;
+        double rotation_rad = 0.0, rotation_deviation_rad = 1.0;
+        double velocity_mps = 0.0, velocity_deviation_mps = 1.0;
+    };
     /// @return false: this is beyond belief, the IMU is faulty from now on
-    bool see_correction(const Eigen::Vector3d& rotation_rad, double rotation_deviation_rad,
-                        const Eigen::Vector3d& velocity_mps, double velocity_deviation_mps);
-    /// While the IMU is not in use: the turn over a frame after the gyroscope and after the lidar.
-    void see_turns(const Eigen::Vector3d& gyro_rad, const Eigen::Vector3d& lidar_rad);
+    bool see_correction(const Correction& correction);
+    /// While the IMU is not in use: how far its turn over a frame is from the lidar's, and its mean force from what the
+    /// change of the lidar's velocity and gravity ask for.
+    void see_motion(const Eigen::Vector3d& turn_difference_rad, double force_difference_mps2);
 
     /// The lidar made sense only without the IMU: it is faulty from now on.
     void blame() { fail(); }

@@ -9,6 +9,9 @@ constexpr std::size_t kMinFirstPoints = 100;
 constexpr double kPoorShare = 0.6;
 // Of two registrations one is better with so many times more matches near their planes.
 constexpr double kClearlyBetter = 1.2;
+// The same by the surfaces that tell a motion over the ground, and what it takes to be as usual again.
+constexpr double kPoorFit = 0.2;
+constexpr double kUsualFit = 0.4;
 constexpr double kNearSmoothing = 0.2;
 // After so long without a registration the map is given up.
 constexpr double kLost_s = 2.0;
@@ -96,8 +99,10 @@ void Odometry::State::process(Frame& frame, const OdometryFeedback* feedback) {
         const MotionFilter before = filter;
         registered = estimate(frame);
         if (frame.header.usable && filter.uses_imu() && !bootstrapping) {
-            const bool poor = !registered || static_cast<double>(near) < kPoorShare * usual_near;
-            if (poor || !imu_is_consistent()) retry_without_imu(frame, before);
+            const bool poor = !registered || static_cast<double>(near) < kPoorShare * usual_near ||
+                              (level_known && fit() < kPoorFit * usual_fit);
+            const bool absurd = registered && !imu_is_consistent();
+            if (poor || absurd) retry_without_imu(frame, before, absurd);
         }
         if (!registered && frame.header.usable && !bootstrapping) {
             const double since_s = static_cast<double>(frame.header.stamp_ns - searched_ns) * 1e-9;
@@ -123,8 +128,9 @@ void Odometry::State::process(Frame& frame, const OdometryFeedback* feedback) {
     update_sweep(frame);
     write_result(frame);
     if (registered) {
-        see_turn(frame.header.stamp_ns);
+        see_motion(frame);
         usual_near += kNearSmoothing * (static_cast<double>(near) - usual_near);
+        usual_fit += kNearSmoothing * (fit() - usual_fit);
         last_registered_ns = frame.header.stamp_ns;
         place_target(frame.prepared.points, excluded, filter.T_world_sensor());
     }
@@ -191,14 +197,18 @@ void Odometry::State::begin_world(const Frame& frame, const StartLevel::Gravity&
 }
 
 /// The prediction by the IMU may have misled the registration: does the lidar alone do better?
-void Odometry::State::retry_without_imu(const Frame& frame, const MotionFilter& before) {
+/// @param absurd what the IMU says can not be: the lidar alone counts if it does no worse
+void Odometry::State::retry_without_imu(const Frame& frame, const MotionFilter& before, bool absurd) {
     const MotionFilter with_imu = filter;
     const bool was_registered = registered;
     const double was_near = static_cast<double>(near);
+    const double was_fit = fit();
     filter = before;
     use_constant_velocity();
     registered = estimate(frame);
-    if (registered && (!was_registered || static_cast<double>(near) > kClearlyBetter * was_near)) {
+    const bool better = static_cast<double>(near) > kClearlyBetter * was_near || (absurd && fit() >= was_fit) ||
+                        (level_known && was_fit < kPoorFit * usual_fit && fit() > kUsualFit * usual_fit);
+    if (registered && (!was_registered || better)) {
         monitor.blame();
         flags |= OdometryResult::kImuFaulty;
         return;
@@ -227,26 +237,47 @@ void Odometry::State::choose_motion_model(const Frame& frame) {
         use_constant_velocity();
     } else if (!filter.uses_imu() && monitor.usable() && !frame.imu.empty()) {
         filter.use_imu(&imu);
-        filter.set_gravity(-kStandardGravity_mps2 * (filter.state().rotation * mean_force(frame)));
+        if (!gravity_known) filter.set_gravity(-kStandardGravity_mps2 * (filter.state().rotation * mean_force(frame)));
+        gravity_known = true;
     }
     if (monitor.faulty()) flags |= OdometryResult::kImuFaulty;
 }
 
-/// Tells the monitor how far off the prediction by the IMU was.
+/// Tells the monitor how far off the prediction by the IMU was. Where it is trusted more than the lidar, what the lidar
+/// would still change counts, too.
 bool Odometry::State::imu_is_consistent() {
     const MotionFilter::Vector correction = filter.correction();
     const MotionFilter::Vector deviation = filter.prior_deviation();
-    return monitor.see_correction(correction.segment<3>(3), deviation.segment<3>(3).norm(), correction.segment<3>(6),
-                                  deviation.segment<3>(6).norm());
+    const Vector6d left = from_scan * equations.b[0];
+    const double clock_m = kClockOffset_s * filter.state().velocity_mps.norm();
+    const double position_m2 =
+        deviation.head<3>().squaredNorm() + from_scan.topLeftCorner<3, 3>().trace() + clock_m * clock_m;
+    // Before the level is known its error moves the prediction.
+    const double position_m = level_known ? (correction.head<3>() - left.head<3>()).norm() : 0.0;
+    return monitor.see_correction({.position_m = position_m,
+                                   .position_deviation_m = std::sqrt(position_m2),
+                                   .rotation_rad = correction.segment<3>(3).norm(),
+                                   .rotation_deviation_rad = deviation.segment<3>(3).norm(),
+                                   .velocity_mps = correction.segment<3>(6).norm(),
+                                   .velocity_deviation_mps = deviation.segment<3>(6).norm()});
 }
 
-/// Direction of the mean specific force over the frame, body axes: up, when at rest.
-Eigen::Vector3d Odometry::State::mean_force(const Frame& frame) const {
+/// Mean specific force over the frame, body axes; 0 where there is none.
+Eigen::Vector3d Odometry::State::specific_force(const Frame& frame) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    int samples = 0;
     for (const ImuSample& sample : frame.imu) {
-        if (sample.acceleration_mps2.allFinite()) sum += sample.acceleration_mps2.cast<double>();
+        if (!sample.acceleration_mps2.allFinite()) continue;
+        sum += sample.acceleration_mps2.cast<double>();
+        ++samples;
     }
-    return sum.norm() > 1.0 ? Eigen::Vector3d(sum.normalized()) : Eigen::Vector3d::UnitZ();
+    return sum / std::max(1, samples);
+}
+
+/// Its direction: up, when at rest.
+Eigen::Vector3d Odometry::State::mean_force(const Frame& frame) {
+    const Eigen::Vector3d force = specific_force(frame);
+    return force.norm() > 0.1 ? Eigen::Vector3d(force.normalized()) : Eigen::Vector3d::UnitZ();
 }
 
 /// Smoothed points of surfaces: what makes a scan worth beginning with.
@@ -276,6 +307,7 @@ void Odometry::State::start(const Frame& frame, const Eigen::Isometry3d& T_world
         for (int axis = 0; axis < 3; ++axis) filter.observe_rest(Eigen::Vector3d::Unit(axis));
     }
     if (monitor.faulty()) flags |= OdometryResult::kImuFaulty;
+    gravity_known = gravity_known || with_imu;
     started = true;
     map_sequence = frame.header.sequence;
     bootstrapping = true;
@@ -303,17 +335,25 @@ void Odometry::State::restart(const Frame& frame, const Matrix6d& moved) {
     start(frame, filter.T_world_sensor());
 }
 
-/// The turn since the last registered scan after the lidar, beside the gyroscope's.
-void Odometry::State::see_turn(std::int64_t stamp_ns) {
+/// Turn and change of velocity since the last registered scan after the lidar, beside what the IMU says.
+void Odometry::State::see_motion(const Frame& frame) {
+    const std::int64_t stamp_ns = frame.header.stamp_ns;
     const double dt = static_cast<double>(stamp_ns - target_ns) * 1e-9;
     const Eigen::Quaterniond rotation = filter.state().rotation;
+    const Eigen::Vector3d velocity_mps = filter.state().velocity_mps;
     if (target_ns != 0 && dt > 0.0 && dt < kMaxSweep_s) {
         const Eigen::Vector3d turn = so3_log(target_rotation.conjugate() * rotation);
         lidar_rate_radps = turn / dt;
-        if (!imu.empty()) monitor.see_turns(imu.turn(target_ns, stamp_ns), turn);
+        if (!imu.empty()) {
+            const Eigen::Vector3d free_mps2 = (velocity_mps - target_velocity_mps) / dt - filter.state().gravity_mps2;
+            const Eigen::Vector3d force_mps2 = rotation * specific_force(frame);
+            monitor.see_motion(imu.turn(target_ns, stamp_ns) - turn,
+                               gravity_known ? (force_mps2 - free_mps2).norm() : force_mps2.norm() - free_mps2.norm());
+        }
     }
     target_ns = stamp_ns;
     target_rotation = rotation;
+    target_velocity_mps = velocity_mps;
 }
 
 }  // namespace dlod

@@ -29,6 +29,7 @@ struct Odometry::State {
 
   private:
     static constexpr double kMaxSweep_s = 0.5;
+    static constexpr double kClockOffset_s = 1e-3;  ///< that the clocks of IMU and lidar may have
 
     void apply(const OdometryFeedback& feedback);
     void start(const Frame& frame, const Eigen::Isometry3d& T_world_sensor);
@@ -40,7 +41,7 @@ struct Odometry::State {
     bool find_again(const Frame& frame);
     void choose_motion_model(const Frame& frame);
     bool imu_is_consistent();
-    void retry_without_imu(const Frame& frame, const MotionFilter& before);
+    void retry_without_imu(const Frame& frame, const MotionFilter& before, bool absurd);
     void use_constant_velocity();
     void bootstrap(const Frame& frame);
     void register_frame(const Frame& frame, int first_stage_iterations, double widening);
@@ -63,13 +64,14 @@ struct Odometry::State {
     void update_sweep(const Frame& frame);
     void place_target(const PointSelection& points, std::span<const std::uint8_t> without,
                       const Eigen::Isometry3d& T_world_sensor);
-    void see_turn(std::int64_t stamp_ns);
+    void see_motion(const Frame& frame);
     void update_anchor(const Eigen::Vector3d& position_m);
     Matrix6d covariance_in_world(const Eigen::Vector3d& position_m, double range_m, const Matrix6d& deviation);
     void write_result(Frame& frame);
     void write_keyframe_points(Frame& frame) const;
     void write_nothing(Frame& frame) const;
-    Eigen::Vector3d mean_force(const Frame& frame) const;
+    static Eigen::Vector3d specific_force(const Frame& frame);
+    static Eigen::Vector3d mean_force(const Frame& frame);
     double median_range(const PointSelection& points);
 
     SensorModel sensor;
@@ -83,6 +85,7 @@ struct Odometry::State {
     MovingPoints moving;
 
     bool started = false;
+    bool gravity_known = false;        ///< the world is level, or the IMU has told how it is not
     std::uint64_t world_sequence = 0;  ///< of the frame that the world began with
     std::uint64_t map_sequence = 0;    ///< of the frame that the map began with
     bool bootstrapping = false;        ///< the map is one scan that has not been deskewed for its velocity
@@ -107,6 +110,7 @@ struct Odometry::State {
     Eigen::Isometry3d T_world_target = Eigen::Isometry3d::Identity();     ///< pose of the first stage's target scan
     std::int64_t target_ns = 0;                                           ///< its stamp
     Eigen::Quaterniond target_rotation = Eigen::Quaterniond::Identity();  ///< of the body
+    Eigen::Vector3d target_velocity_mps = Eigen::Vector3d::Zero();        ///< of the body, world
     Eigen::Vector3d lidar_rate_radps = Eigen::Vector3d::Zero();  ///< body, between the last two registered scans
 
     // Of the present frame.
@@ -122,6 +126,7 @@ struct Odometry::State {
     std::size_t candidates = 0;  ///< points that might have found a counterpart
     std::size_t near = 0;        ///< matches that lie on their planes
     double usual_near = 0.0;     ///< the same over the last frames
+    double usual_fit = 0.0;      ///< what speaks for the motion over the ground, over the last frames
     PlaneMatches matches;
     NormalEquations equations;
     SurfaceInformation surface_information;

@@ -10,6 +10,14 @@ namespace {
 constexpr std::int64_t kFrame_ns = 100'000'000;
 constexpr std::int64_t kSample_ns = 10'000'000;
 
+ImuMonitor::Correction correction(double rotation_rad, double rotation_deviation_rad, double velocity_mps,
+                                  double velocity_deviation_mps) {
+    return {.rotation_rad = rotation_rad,
+            .rotation_deviation_rad = rotation_deviation_rad,
+            .velocity_mps = velocity_mps,
+            .velocity_deviation_mps = velocity_deviation_mps};
+}
+
 class ImuMonitorTest : public testing::Test {
   protected:
     /// A frame's samples as a sensor that walks gives them.
@@ -35,7 +43,7 @@ class ImuMonitorTest : public testing::Test {
     int frames_until_usable() {
         for (int frames = 1; frames < 2000; ++frames) {
             see(walking());
-            monitor.see_turns({0.01, 0.0, 0.02}, {0.011, 0.0, 0.019});
+            monitor.see_motion({0.001, 0.0, -0.001}, 0.3);
             if (monitor.usable()) return frames;
         }
         return -1;
@@ -67,7 +75,7 @@ TEST_F(ImuMonitorTest, GoodSamplesAreBelievedAtOnce) {
     for (int i = 0; i < 200; ++i) {
         see(walking());
         EXPECT_TRUE(monitor.usable());
-        EXPECT_TRUE(monitor.see_correction({1e-4, 0, 0}, 1e-3, {0.01, 0, 0}, 0.02));
+        EXPECT_TRUE(monitor.see_correction(correction(1e-4, 1e-3, 0.01, 0.02)));
     }
 }
 
@@ -116,7 +124,11 @@ TEST_F(ImuMonitorTest, ItIsNotTakenBackWhileItDisagreesWithTheLidar) {
     monitor.blame();
     for (int i = 0; i < 500; ++i) {
         see(walking());
-        monitor.see_turns({0.0, 0.0, 0.1}, {0.1, 0.0, 0.0});
+        if (i % 2 == 0) {
+            monitor.see_motion({0.1, 0.0, -0.1}, 0.0);
+        } else {
+            monitor.see_motion({0.0, 0.0, 0.0}, 5.0);
+        }
         ASSERT_FALSE(monitor.usable());
     }
     EXPECT_GT(frames_until_usable(), 0);
@@ -125,23 +137,31 @@ TEST_F(ImuMonitorTest, ItIsNotTakenBackWhileItDisagreesWithTheLidar) {
 TEST_F(ImuMonitorTest, ACorrectionIsImpossibleOnlyBeyondBothItsDeviationAndItsBound) {
     see(walking());
     // Large, but the prediction did not claim to know.
-    EXPECT_TRUE(monitor.see_correction({0.05, 0, 0}, 0.1, {3.0, 0, 0}, 3.0));
+    EXPECT_TRUE(monitor.see_correction(correction(0.05, 0.1, 3.0, 3.0)));
     // Many deviations, but a hair.
-    EXPECT_TRUE(monitor.see_correction({0.002, 0, 0}, 1e-5, {0.05, 0, 0}, 1e-4));
+    EXPECT_TRUE(monitor.see_correction(correction(0.002, 1e-5, 0.05, 1e-4)));
     EXPECT_TRUE(monitor.usable());
-    EXPECT_FALSE(monitor.see_correction({0.05, 0, 0}, 1e-3, {0, 0, 0}, 1.0));
+    EXPECT_FALSE(monitor.see_correction(correction(0.05, 1e-3, 0, 1.0)));
     EXPECT_TRUE(monitor.faulty());
 
     monitor = ImuMonitor();
     see(walking());
-    EXPECT_FALSE(monitor.see_correction({0, 0, 0}, 1e-3, {2.0, 0, 0}, 0.01));
+    EXPECT_FALSE(monitor.see_correction(correction(0, 1e-3, 2.0, 0.01)));
+    EXPECT_TRUE(monitor.faulty());
+}
+
+TEST_F(ImuMonitorTest, APositionThatTheAccelerometerCanNotHaveMissedIsImpossible) {
+    see(walking());
+    EXPECT_TRUE(monitor.see_correction({.position_m = 0.03, .position_deviation_m = 1e-3}));
+    EXPECT_TRUE(monitor.see_correction({.position_m = 0.2, .position_deviation_m = 0.1}));
+    EXPECT_FALSE(monitor.see_correction({.position_m = 0.1, .position_deviation_m = 0.01}));
     EXPECT_TRUE(monitor.faulty());
 }
 
 TEST_F(ImuMonitorTest, SuspiciousCorrectionsAddUp) {
     see(walking());
     int frames = 0;
-    while (monitor.see_correction({0.027, 0, 0}, 1e-3, {0, 0, 0}, 1.0) && frames < 100) ++frames;
+    while (monitor.see_correction(correction(0.027, 1e-3, 0, 1.0)) && frames < 100) ++frames;
     EXPECT_GT(frames, 1);
     EXPECT_LT(frames, 20);
     EXPECT_TRUE(monitor.faulty());
@@ -151,7 +171,7 @@ TEST_F(ImuMonitorTest, SuspiciousCorrectionsAddUp) {
     for (int i = 0; i < 200; ++i) {
         // One in ten is no pattern.
         const double rotation = i % 10 == 0 ? 0.027 : 1e-4;
-        EXPECT_TRUE(monitor.see_correction({rotation, 0, 0}, 1e-3, {0, 0, 0}, 1.0));
+        EXPECT_TRUE(monitor.see_correction(correction(rotation, 1e-3, 0, 1.0)));
     }
     EXPECT_TRUE(monitor.usable());
 }
