@@ -5,9 +5,8 @@
 namespace dlod {
 namespace {
 
-// What it takes to take a direction back: so many times what would have kept it, in so many frames on end.
-constexpr double kDemandWithImu = 3.0;
-constexpr double kDemandWithoutImu = 6.0;
+// What it takes to take a direction back without IMU: so many times what would have kept it, in so many frames on end.
+constexpr double kDemand = 6.0;
 constexpr int kFrames = 3;
 
 }  // namespace
@@ -18,10 +17,10 @@ void HeldDirections::begin_frame() {
 }
 
 void HeldDirections::judge(const PlaneMatches& matches, const NormalEquations& equations, bool with_imu) {
-    const double demand = with_imu ? kDemandWithImu : kDemandWithoutImu;
-    observability_ = Observability::of(matches, equations, adrift_ ? demand : 1.0);
+    const bool reluctant = adrift_ && !with_imu;
+    observability_ = Observability::of(matches, equations, reluctant ? kDemand : 1.0);
     shows_all_ = observability_.unobservable() == 0;
-    if (adrift_ && frames_showing_all_ < kFrames) {
+    if (reluctant && frames_showing_all_ < kFrames) {
         observability_ = Observability::of(matches, equations, std::numeric_limits<double>::infinity());
     }
 }

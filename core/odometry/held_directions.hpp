@@ -5,13 +5,13 @@
 
 namespace dlod {
 
-/// A direction is let go of as soon as the matches do not show it. It is taken back reluctantly: what comes into view
-/// in a tunnel are first of all people and vehicles, and for some frames these look like structure. So more has to face
-/// it than would have kept it, for several frames on end.
+/// A direction is let go of as soon as the matches do not show it. Without IMU it is taken back reluctantly: what comes
+/// into view in a tunnel are first of all people and vehicles, and for some frames these look like structure. So more
+/// has to face it than would have kept it, for several frames on end. With the IMU the prediction stays good enough for
+/// what moves not to match it, and in a street where little faces along it each frame without that little drifts.
 class HeldDirections {
   public:
     /// Judges the matches of a stage's first iteration.
-    /// @param with_imu the prediction stays good enough that what moves does not match: less has to face a direction
     void judge(const PlaneMatches& matches, const NormalEquations& equations, bool with_imu);
     /// The last judgement.
     const Observability& observability() const { return observability_; }

@@ -30,6 +30,8 @@ constexpr double kMaxGravityError_mps2 = 0.6;
 // A start that leaves more of the positions unexplained is tried again, so many times.
 constexpr double kMaxScatter = 1.0;
 constexpr int kMaxRetries = 3;
+// So many times what makes a direction observable has to face it before the lidar accuses the IMU of a wrong position.
+constexpr double kAccusationDemand = 6.0;
 // Where the robot may be after that: standard deviations.
 constexpr double kAway_m = 15.0;
 constexpr double kAway_rad = 1.0;
@@ -252,8 +254,9 @@ bool Odometry::State::imu_is_consistent() {
     const double clock_m = kClockOffset_s * filter.state().velocity_mps.norm();
     const double position_m2 =
         deviation.head<3>().squaredNorm() + from_scan.topLeftCorner<3, 3>().trace() + clock_m * clock_m;
-    // Before the level is known its error moves the prediction.
-    const double position_m = level_known ? (correction.head<3>() - left.head<3>()).norm() : 0.0;
+    // Before the level is known its error moves the prediction; and in a tunnel a van may be all that faces along it.
+    const bool shown = Observability::of(matches, equations, kAccusationDemand).unobservable() == 0;
+    const double position_m = level_known && shown ? (correction.head<3>() - left.head<3>()).norm() : 0.0;
     return monitor.see_correction({.position_m = position_m,
                                    .position_deviation_m = std::sqrt(position_m2),
                                    .rotation_rad = correction.segment<3>(3).norm(),
