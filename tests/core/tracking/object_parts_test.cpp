@@ -1,0 +1,170 @@
+// Detections that are parts of an object, and such as only seem to be.
+#include <gtest/gtest.h>
+
+#include "tests/support/tracker_test_fixture.hpp"
+
+namespace dlod {
+namespace {
+
+using test::Cylinder;
+using ObjectPartsTest = test::TrackerTest;
+
+// The parts of an object that an occluder splits are one object.
+TEST_F(ObjectPartsTest, SplitPartsJoinTheirTrack) {
+    Tracker tracker(sensor, config);
+    for (int k = 0; k < 20; ++k) {
+        scene.next();
+        const auto all = scene.place(person(4.0 + 0.1 * k, 2.0));
+        if (k < 10) {
+            scene.detect(all, true);
+        } else {
+            scene.detect({all.begin(), all.begin() + 40}, true);
+            scene.detect({all.begin() + 60, all.end()}, true);
+        }
+        tracker.process(scene.frame);
+        ASSERT_EQ(scene.frame.detection.tracks.size(), 1U) << k;
+        for (const Detection& d : scene.frame.detection.detections) EXPECT_EQ(d.track, 0);
+    }
+    EXPECT_EQ(scene.frame.detection.tracks[0].points, 100);
+}
+
+// Two walls of a house that has just come into view: the box of what is undecided holds the pavement, too.
+TEST_F(ObjectPartsTest, AWalkerIsNoPartOfAHouseThatHePasses) {
+    Tracker tracker(sensor, config);
+    for (int k = 0; k < 12; ++k) {
+        scene.next();
+        std::vector<PixelIndex> house;
+        for (int i = 0; i < 8; ++i) {
+            for (const auto& [x, y] : {std::pair{5.0 + i, 5.0}, std::pair{12.5, 2.0 + 0.4 * i}}) {
+                Cylinder wall = person(x, y);
+                wall.moving = false;
+                wall.radius_m = 0.5;
+                const auto part = scene.place(wall);
+                house.insert(house.end(), part.begin(), part.end());
+            }
+        }
+        Detection& undecided = scene.detect(house, false);
+        undecided.unknown_points = undecided.occupied_points;
+        undecided.occupied_points = 0;
+        undecided.average_residual_m = 1.0;
+        const double x = 9.5 - 0.13 * k;
+        if (k >= 4) scene.add(person(x, 3.5));
+        tracker.process(scene.frame);
+        if (k < 6) continue;
+        const auto& detections = scene.frame.detection.detections;
+        EXPECT_NE(detections[0].track, detections[1].track) << k;
+        const Track& walker = scene.frame.detection.tracks[static_cast<std::size_t>(detections[1].track)];
+        EXPECT_EQ(walker.state, DynamicState::kDynamic) << k;
+        EXPECT_LT(walker.box.longest_m(), 1.0) << k;
+        const Track& walls = scene.frame.detection.tracks[static_cast<std::size_t>(detections[0].track)];
+        EXPECT_NE(walls.state, DynamicState::kDynamic) << k;
+    }
+}
+
+TEST_F(ObjectPartsTest, AWallThatAPersonComesNearToIsNoPartOfHim) {
+    Tracker tracker(sensor, config);
+    for (int k = 0; k < 12; ++k) {
+        scene.next();
+        Detection& one = scene.add(person(4.0, 0.0));
+        one.free_points = k < 11 ? 0 : 35;  // of 120: he sets off
+        one.occupied_points = 120 - one.free_points;
+        one.average_residual_m = 0.02;
+        if (k == 11) {
+            Cylinder wall = person(4.1, 0.15);
+            wall.radius_m = 0.2;
+            wall.moving = false;
+            wall.points = 300;
+            scene.add(wall);
+        }
+        tracker.process(scene.frame);
+    }
+    const auto& detections = scene.frame.detection.detections;
+    ASSERT_GE(detections[0].track, 0);
+    EXPECT_NE(detections[0].track, detections[1].track);
+}
+
+// Evidence divides a slow object: part of it stands where it was, part where it was not.
+TEST_F(ObjectPartsTest, TheRestOfADividedObjectStaysPartOfIt) {
+    Tracker tracker(sensor, config);
+    for (int k = 0; k < 20; ++k) {
+        scene.next();
+        const auto all = scene.place(person(4.0 + 0.1 * k, 2.0));
+        if (k < 10) {
+            scene.detect(all, true);
+        } else {
+            const std::uint32_t segment = scene.detect({all.begin(), all.begin() + 40}, true).segment;
+            scene.detect({all.begin() + 40, all.end()}, false).segment = segment;
+        }
+        tracker.process(scene.frame);
+        ASSERT_EQ(scene.frame.detection.tracks.size(), 1U) << k;
+        EXPECT_EQ(scene.frame.detection.tracks[0].points, 120) << k;
+    }
+    EXPECT_EQ(scene.frame.detection.tracks[0].state, DynamicState::kDynamic);
+}
+
+// Bonnets return little: of a car that comes only bumper and windscreen are seen.
+TEST_F(ObjectPartsTest, BumperAndWindscreenAreOneTrack) {
+    Tracker tracker(sensor, config);
+    const auto piece = [&](double x, double z, double height_m) {
+        Cylinder c;
+        c.foot_m = {x, 0.0, z};
+        c.radius_m = 0.8;
+        c.height_m = height_m;
+        return c;
+    };
+    for (int k = 0; k < 30; ++k) {
+        scene.next();
+        const double x = 25.0 - 0.4 * k;
+        scene.add(piece(x, -1.0, 0.4));
+        scene.add(piece(x + 1.8, -0.4, 0.6));
+        tracker.process(scene.frame);
+        if (k < 15) continue;
+        ASSERT_EQ(scene.frame.detection.tracks.size(), 1U) << k;
+        EXPECT_EQ(scene.frame.detection.tracks[0].id, 1U);
+        EXPECT_GT(scene.frame.detection.tracks[0].box.size_m.x(), 2.5);
+    }
+}
+
+TEST_F(ObjectPartsTest, ADogBeforeItsOwnerKeepsItsTrack) {
+    Tracker tracker(sensor, config);
+    for (int k = 0; k < 30; ++k) {
+        scene.next();
+        const double x = 12.0 - 0.18 * k;
+        Cylinder dog = person(x, 0.0);
+        dog.radius_m = 0.2;
+        dog.height_m = 0.6;
+        scene.add(dog);
+        scene.add(person(x + 1.3, 0.0));
+        tracker.process(scene.frame);
+        ASSERT_EQ(scene.frame.detection.tracks.size(), 2U) << k;
+    }
+}
+
+// Of a car that crawls only the front stands where it was free.
+TEST_F(ObjectPartsTest, AFrontAsWideAsTheVehicleBelongsToIt) {
+    const auto part = [&](double x, double radius_m) {
+        Cylinder c;
+        c.foot_m = {x, 0.0, -1.2};
+        c.radius_m = radius_m;
+        c.height_m = 1.4;
+        return c;
+    };
+    for (const double radius_m : {0.9, 0.25}) {  // a front, a person who stands in front
+        Tracker tracker(sensor, config);
+        for (int k = 0; k < 24; ++k) {
+            scene.next();
+            auto rest = scene.place(part(8.0, 0.9));
+            const auto back = scene.place(part(10.5, 0.9));
+            rest.insert(rest.end(), back.begin(), back.end());
+            const auto front = scene.place(part(7.2, radius_m));
+            const std::uint32_t segment = scene.detect(rest, false).segment;
+            if (k >= 6) scene.detect(front, true).segment = segment;
+            tracker.process(scene.frame);
+        }
+        EXPECT_EQ(scene.frame.detection.detections[1].track == scene.frame.detection.detections[0].track,
+                  radius_m > 0.5);
+    }
+}
+
+}  // namespace
+}  // namespace dlod
