@@ -30,7 +30,8 @@ for subcommand in $subcommands; do
 done
 [[ $(complete_words dlod command save) == save-map ]] || fail "'dlod command save' is not completed"
 [[ $(complete_words dlod-sim squ) == square ]] || fail "'dlod-sim squ' is not completed"
-complete_words dlod run --set odometry. | grep -qx 'odometry.use_imu=' || fail "keys are not completed after --set"
+# Not through pipes: grep ends at the first match, and whoever still writes then would fail.
+grep -qx 'odometry.use_imu=' <<<"$(complete_words dlod run --set odometry.)" || fail "keys are not completed after --set"
 
 pages=$prefix/share/man/man1
 for program in dlod-sim dlod-eval dlod-draw dlod-listen dlod ${subcommands//$'\n'/ }; do
@@ -45,7 +46,7 @@ for program in dlod-sim dlod-eval dlod-draw dlod-listen dlod ${subcommands//$'\n
     offered=$(complete_words "${command[@]}" -)
     for option in $options; do
         grep -qx -- "$option" <<<"$offered" || fail "'${command[*]} $option' is not completed"
-        [[ ! -d $pages ]] || sed 's/\\//g' "$pages/$page.1" | grep -q -- "$option" || fail "$page.1 lacks $option"
+        [[ ! -d $pages ]] || grep -q -- "$option" <<<"$(sed 's/\\//g' "$pages/$page.1")" || fail "$page.1 lacks $option"
     done
 done
 echo "completion and manual pages have every option"
