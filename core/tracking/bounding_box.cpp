@@ -52,6 +52,18 @@ DLOD_MULTIVERSION void extent_along(std::size_t n, const float* __restrict x, co
     }
 }
 
+/// out = R p for the points of `pixel`. @param R row-major 3 x 3
+DLOD_MULTIVERSION void rotate_points(std::size_t n, const PixelIndex* __restrict pixel, const float* __restrict x,
+                                     const float* __restrict y, const float* __restrict z, const float* __restrict R,
+                                     float* __restrict out_x, float* __restrict out_y, float* __restrict out_z) {
+    for (std::size_t i = 0; i < n; ++i) {
+        const float px = x[pixel[i]], py = y[pixel[i]], pz = z[pixel[i]];
+        out_x[i] = R[0] * px + (R[1] * py + R[2] * pz);
+        out_y[i] = R[3] * px + (R[4] * py + R[5] * pz);
+        out_z[i] = R[6] * px + (R[7] * py + R[8] * pz);
+    }
+}
+
 }  // namespace
 
 PointSpan points_of(const LocalPoints& points, std::size_t first, std::size_t count) {
@@ -63,13 +75,9 @@ void gather_points(std::span<const PixelIndex> pixels, const Image<float>& x, co
                    const Image<float>& z, const Eigen::Isometry3d& T_world_sensor, LocalPoints& out) {
     out.origin_m = T_world_sensor.translation();
     out.resize(pixels.size());
-    const Eigen::Matrix3f R = T_world_sensor.linear().cast<float>();
-    for (std::size_t i = 0; i < pixels.size(); ++i) {
-        const Eigen::Vector3f p = R * Eigen::Vector3f(x[pixels[i]], y[pixels[i]], z[pixels[i]]);
-        out.x[i] = p.x();
-        out.y[i] = p.y();
-        out.z[i] = p.z();
-    }
+    const Eigen::Matrix<float, 3, 3, Eigen::RowMajor> R = T_world_sensor.linear().cast<float>();
+    rotate_points(pixels.size(), pixels.data(), x.data(), y.data(), z.data(), R.data(), out.x.data(), out.y.data(),
+                  out.z.data());
 }
 
 PrincipalAxis principal_axis(const PointSpan& points, const Eigen::Vector3d& origin_m) {
