@@ -19,21 +19,16 @@ struct Detector::State {
           completion(sensor, c.completion),
           row_ends(2 * static_cast<std::size_t>(sensor.height)) {
         counts.reserve(4096);
+        turned.reserve(4096);
         whole.reserve(4096);
         completed.reserve(sensor.pixels());
     }
-
-    /// Tested pixels of a segment by what they say.
-    struct Counts {
-        int free = 0, occupied = 0, unknown = 0;
-        bool plate = false;  ///< a part of it has turned
-    };
 
     void test(const Frame& frame);
     void find_plates(const Frame& frame);
     void count(const Frame& frame);
     bool is_compact(const Segment& segment) const;
-    bool is_divided(const Segment& segment, const Counts& c) const;
+    bool is_divided(const Segment& segment, std::size_t s) const;
     void detect(Frame& frame);
     void add(Frame& frame, std::size_t segment, std::span<const PixelIndex> pixels);
     void complete(Frame& frame);
@@ -44,17 +39,16 @@ struct Detector::State {
     MovingParts parts;
     TurnedPlates plates;
     Completion completion;
-    std::vector<Counts> counts;       ///< by segment
-    std::vector<std::uint8_t> whole;  ///< likewise: 1 of what is no larger than a person
+    std::vector<EvidenceImage::Counts> counts;  ///< by segment
+    std::vector<std::uint8_t> turned;           ///< likewise: 1 of what has a part that has turned
+    std::vector<std::uint8_t> whole;            ///< likewise: 1 of what is no larger than a person
     std::vector<int> row_ends;
     std::vector<PixelIndex> completed;  ///< pixels of the completed detections, swapped with the frame's
 };
 
 void Detector::State::count(const Frame& frame) {
     for (const PixelIndex pixel : evidence.tested()) {
-        Counts& c = counts[frame.prepared.segment[pixel] - 1];
-        const Evidence e = evidence[pixel];
-        (e == Evidence::kFree ? c.free : e == Evidence::kOccupied ? c.occupied : c.unknown) += 1;
+        counts[frame.prepared.segment[pixel] - 1].add(evidence[pixel]);
     }
 }
 
@@ -64,9 +58,10 @@ bool Detector::State::is_compact(const Segment& segment) const {
 }
 
 /// Free and occupied places in one segment, or free ones in something that is no object: only parts of it move.
-bool Detector::State::is_divided(const Segment& segment, const Counts& c) const {
+bool Detector::State::is_divided(const Segment& segment, std::size_t s) const {
     constexpr int kFewest = 3;
-    if (c.plate) return true;
+    if (turned[s] != 0) return true;
+    const EvidenceImage::Counts& c = counts[s];
     if (c.free < kFewest) return false;
     // A slow or turning object is partly where it was before: one no larger than a person stays whole unless most of it
     // was there.
@@ -79,6 +74,7 @@ void Detector::State::test(const Frame& frame) {
     parts.begin();
     const Preparation& prepared = frame.prepared;
     counts.assign(prepared.segments.size(), {});
+    turned.assign(prepared.segments.size(), 0);
     whole.assign(prepared.segments.size(), 0);
     for (std::size_t s = 0; s < prepared.segments.size(); ++s) whole[s] = is_compact(prepared.segments[s]) ? 1 : 0;
     for (const Segment& segment : prepared.segments) {
@@ -97,7 +93,7 @@ void Detector::State::test(const Frame& frame) {
     plates.begin();
     if (config.use_plates) plates.request(frame, whole, evidence);
     for (std::size_t s = 0; s < prepared.segments.size(); ++s) {
-        if (is_divided(prepared.segments[s], counts[s])) parts.request_around(frame, prepared.segments[s], evidence);
+        if (is_divided(prepared.segments[s], s)) parts.request_around(frame, prepared.segments[s], evidence);
     }
     evidence.run(frame);
     count(frame);
@@ -109,7 +105,7 @@ void Detector::State::find_plates(const Frame& frame) {
     plates.find(frame, evidence);
     for (std::size_t k = 0; k < plates.size(); ++k) {
         parts.take(plates[k]);
-        counts[frame.prepared.segment[plates[k].front()] - 1].plate = true;
+        turned[frame.prepared.segment[plates[k].front()] - 1] = 1;
         for (const PixelIndex pixel : plates[k]) evidence.set(pixel, Evidence::kFree);
     }
 }
@@ -164,7 +160,7 @@ void Detector::State::detect(Frame& frame) {
     }
     for (std::size_t s = 0; s < prepared.segments.size(); ++s) {
         const Segment& segment = prepared.segments[s];
-        if (config.use_free_space && is_divided(segment, counts[s])) {
+        if (config.use_free_space && is_divided(segment, s)) {
             const auto add_part = [&](std::span<const PixelIndex> pixels) { add(frame, s, pixels); };
             // What is left of an object may be the part of it that rests.
             parts.find(frame, segment, evidence, add_part, [&](std::span<const PixelIndex> pixels) {

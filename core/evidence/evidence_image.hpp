@@ -29,6 +29,9 @@ class EvidenceImage {
     /// Tested pixels by what they say.
     struct Counts {
         int free = 0, occupied = 0, unknown = 0;
+        void add(Evidence evidence) {
+            (evidence == Evidence::kFree ? free : evidence == Evidence::kOccupied ? occupied : unknown) += 1;
+        }
     };
     Counts count(std::span<const PixelIndex> pixels) const;
     void set(PixelIndex pixel, Evidence evidence) { image_[pixel] = static_cast<std::uint8_t>(evidence); }
