@@ -74,6 +74,11 @@ double footprint_intersection_m2(const OrientedBox& a, const OrientedBox& b) {
     return area(p);
 }
 
+double shared_footprint(const OrientedBox& a, const OrientedBox& b) {
+    const double smaller = std::min(footprint(a), footprint(b));
+    return smaller > 0.0 ? footprint_intersection_m2(a, b) / smaller : 0.0;
+}
+
 double footprint_iou(const OrientedBox& a, const OrientedBox& b) {
     const double both = footprint_intersection_m2(a, b);
     const double either = footprint(a) + footprint(b) - both;
@@ -109,6 +114,14 @@ double Footprint::distance_m(const Eigen::Vector3d& point_m) const {
 
 double footprint_distance_m(const OrientedBox& box, const Eigen::Vector3d& point_m) {
     return Footprint(box).distance_m(point_m);
+}
+
+double height_gap_m(const OrientedBox& a, const OrientedBox& b) {
+    return std::abs(a.center_m.z() - b.center_m.z()) - 0.5 * (a.size_m.z() + b.size_m.z());
+}
+
+double reach_m(const OrientedBox& box) {
+    return 0.5 * box.size_m.head<2>().norm();
 }
 
 double width_along(const OrientedBox& box, const Eigen::Vector2d& axis) {

@@ -8,6 +8,9 @@ namespace dlod {
 /// Area [m^2] that the footprints of two boxes share: the rotated rectangles are clipped exactly.
 double footprint_intersection_m2(const OrientedBox& a, const OrientedBox& b);
 
+/// The same as a share of the smaller footprint, 0 to 1.
+double shared_footprint(const OrientedBox& a, const OrientedBox& b);
+
 /// Intersection over union of the footprints, 0 to 1.
 double footprint_iou(const OrientedBox& a, const OrientedBox& b);
 
@@ -32,6 +35,12 @@ class Footprint {
 
 /// Distance [m] in the ground plane from a point to a box, 0 inside.
 double footprint_distance_m(const OrientedBox& box, const Eigen::Vector3d& point_m);
+
+/// Distance [m] between one box and another above it, negative where their heights overlap.
+double height_gap_m(const OrientedBox& a, const OrientedBox& b);
+
+/// From the middle of a footprint to its corners, metres.
+double reach_m(const OrientedBox& box);
 
 /// How far a box reaches along a direction (unit) in the ground plane, metres.
 double width_along(const OrientedBox& box, const Eigen::Vector2d& axis);

@@ -8,6 +8,7 @@
 #include "core/tracking/box_iou.hpp"
 #include "core/tracking/detection_shapes.hpp"
 #include "core/tracking/merged_detections.hpp"
+#include "core/tracking/object_parts.hpp"
 #include "core/tracking/tracked_object.hpp"
 #include "core/tracking/vehicle_parts.hpp"
 
@@ -15,66 +16,11 @@ namespace dlod {
 
 namespace {
 
-constexpr double kPartMargin_m = 0.15;     // a part's middle lies at most this far outside of the whole object's box
-constexpr double kLimbMargin_m = 0.4;      // and that of a small piece beside a moving object
-constexpr double kSplinterMargin_m = 0.8;  // and of a splinter at the corners of a vehicle
-constexpr unsigned kSplinter = 10;         // that is so much smaller
-constexpr unsigned kLimb = 3;              // small: a third of the object's pixels
-constexpr double kLowLimb = 0.5;           // of the object's height
-constexpr double kLeastBody = 0.6;         // of the height of the object beside it
-constexpr double kInside = 0.6;            // of its footprint lies inside of those margins
-constexpr double kInsideVehicle = 0.8;     // or of a moving vehicle's box itself
-constexpr double kSimilar = 1.5;           // ratio of footprint diagonals
-constexpr int kYoungHits = 10;
-constexpr double kBody_m = 1.2;           // people are no broader
-constexpr double kFree = 0.5;             // evidence of a part that stands where it was free
-constexpr double kAtRest = -0.9;          // evidence of what stands where something stood before
-constexpr double kMoreAtRest = 0.5;       // by that much of the evidence
-constexpr double kStackedOverlap = 0.25;  // share of the smaller height that two halves of one object have in common
-constexpr double kStackedShift_m = 0.4;   // and between their middles in the ground plane
-constexpr double kSameFootprint = 0.4;    // parts above one another share that much of the smaller footprint
-constexpr double kMaxGap_m = 0.5;         // and are at most that far apart in height
-constexpr double kDuplicate = 0.6;        // an unseen track that shares that much with a seen one is the same object
-
-double shared_footprint(const OrientedBox& a, const OrientedBox& b) {
-    const double smaller = std::min(a.size_m.x() * a.size_m.y(), b.size_m.x() * b.size_m.y());
-    return smaller > 0.0 ? footprint_intersection_m2(a, b) / smaller : 0.0;
-}
-
-/// From the middle of a footprint to its corners.
-double reach_m(const OrientedBox& box) {
-    return 0.5 * box.size_m.head<2>().norm();
-}
-
-double height_gap_m(const OrientedBox& a, const OrientedBox& b) {
-    return std::abs(a.center_m.z() - b.center_m.z()) - 0.5 * (a.size_m.z() + b.size_m.z());
-}
-
-/// One above the other, as a rider and his legs or the halves of a person: separate objects do not stand like that.
-bool stacked(const OrientedBox& a, const OrientedBox& b) {
-    return height_gap_m(a, b) > -kStackedOverlap * std::min(a.size_m.z(), b.size_m.z()) &&
-           (a.center_m - b.center_m).head<2>().norm() < kStackedShift_m;
-}
-
-/// A track that sees something low, and is expected inside of a moving object's box, has followed an arm or a leg.
-bool is_limb_of(const TrackedObject& host, const TrackedObject& guest, const Detection& seen) {
-    return host.state() == DynamicState::kDynamic && host.hits() >= kYoungHits &&
-           seen.box.size_m.z() < kLowLimb * host.box().size_m.z() &&
-           share_inside(guest.box(), host.box(), kPartMargin_m) > kInside;
-}
-
-/// It moves, is as tall as the other, and has been seen for long: an object of its own, whatever an occluder has left
-/// of either.
-bool is_body_beside(const TrackedObject& host, const TrackedObject& guest) {
-    return guest.state() == DynamicState::kDynamic && guest.hits() >= kYoungHits &&
-           guest.box().size_m.z() > kLeastBody * host.box().size_m.z();
-}
-
-/// Larger than what is seen of the object, and more at rest than that: a wall that it comes near to.
-bool is_backdrop(const Detection& part, const CandidateDetection& of_part, const Detection& seen,
-                 const CandidateDetection& of_seen) {
-    return part.count > seen.count && of_part.motion <= kAtRest && of_part.motion + kMoreAtRest < of_seen.motion;
-}
+constexpr double kSimilar = 1.5;        // ratio of footprint diagonals
+constexpr double kFree = 0.5;           // evidence of a part that stands where it was free
+constexpr double kSameFootprint = 0.4;  // parts above one another share that much of the smaller footprint
+constexpr double kMaxGap_m = 0.5;       // and are at most that far apart in height
+constexpr double kDuplicate = 0.6;      // an unseen track that shares that much with a seen one is the same object
 
 /// Whether a track that is seen may be the object of one that is not: what moves is not taken for something that rests,
 /// nor a person for what is far larger.
@@ -116,13 +62,6 @@ struct Tracker::State {
     void publish(Frame& frame);
     Sighting sighting_of(const Frame& frame, std::size_t owner);
 
-    /// A detection to whose object others may belong.
-    struct Host {
-        double x_m, y_m, reach_m;  ///< expected middle, and how far from it a part's may be
-        std::size_t detection;
-        int track;
-    };
-
     TrackingConfig config;
     std::vector<TrackedObject> objects;  ///< by ascending id
     std::uint32_t next_id;
@@ -141,7 +80,8 @@ struct Tracker::State {
     std::vector<std::size_t> parts;   ///< detections of the object at hand
     std::vector<std::size_t> strays;  ///< detections without an object
     std::vector<std::size_t> owned;   ///< detections with an object
-    std::vector<Host> hosts;
+    std::vector<PartHost> hosts;      ///< objects that have been found, and may have other parts
+    std::vector<int> track_of_host;
     std::vector<OrientedBox> boxes;  ///< of the objects
     std::vector<double> reaches_m;   ///< and their half diagonals
     std::vector<int> row;            ///< of the objects among the published tracks
@@ -235,76 +175,33 @@ void Tracker::State::join_pieces(Frame& frame) {
     }
 }
 
-// What is left and lies inside of the box of an object that was found is a part of it, split off by an occluder; small
-// pieces beside a moving one are its limbs. A young track on such a piece gives it up, and so do the younger of two
-// tracks that stand on top of one another and the smaller of two that are pieces of one vehicle.
+// What is left may be a part of an object that was found.
 void Tracker::State::attach_parts(Frame& frame) {
     const auto& detections = frame.detection.detections;
-    // A body that moves, seen by itself, is no part of what has not been seen to.
-    const auto passes_by = [&](std::size_t body, std::size_t other) {
-        const OrientedBox& box = detections[body].box;
-        return candidates[body].motion > kFree && candidates[other].motion <= 0.0 &&
-               box.longest_m() < std::min(kBody_m, box.size_m.z());
-    };
+    const auto object = [&](int track) { return track < 0 ? nullptr : &objects[static_cast<std::size_t>(track)]; };
     limb.assign(detections.size(), 0);
     hosts.clear();
+    track_of_host.clear();
     for (std::size_t d = 0; d < detections.size(); ++d) {
-        if (owner[d] < 0 || !objects[static_cast<std::size_t>(owner[d])].steady()) continue;
-        const OrientedBox& box = expected[static_cast<std::size_t>(owner[d])].whole;
-        hosts.push_back({box.center_m.x(), box.center_m.y(), reach_m(box) + kSplinterMargin_m, d, owner[d]});
+        if (owner[d] < 0 || !object(owner[d])->steady()) continue;
+        const ExpectedTrack& as_expected = expected[static_cast<std::size_t>(owner[d])];
+        hosts.emplace_back(*object(owner[d]), as_expected, detections[d], candidates[d]);
+        track_of_host.push_back(owner[d]);
     }
     for (std::size_t d = 0; d < detections.size(); ++d) {
-        const int own = owner[d];
         if (merged.is_apart(d)) continue;
-        const double x = detections[d].centroid_m.x(), y = detections[d].centroid_m.y();
-        double best = 1.0;
-        for (const Host& h : hosts) {
-            const double dx = h.x_m - x, dy = h.y_m - y;
-            if (dx * dx + dy * dy > h.reach_m * h.reach_m || h.track == own) continue;
-            const std::size_t other = h.detection;
-            const auto t = static_cast<std::size_t>(h.track);
-            const TrackedObject& host = objects[t];
-            const TrackedObject* guest = own >= 0 ? &objects[static_cast<std::size_t>(own)] : nullptr;
-            // What is known to move is no part of what is not.
-            if (guest != nullptr && guest->hits() >= kYoungHits && guest->state() == DynamicState::kDynamic &&
-                host.state() != DynamicState::kDynamic)
-                continue;
-            const OrientedBox& box = expected[t].whole;
-            // Where a vehicle drives there is nothing else, even if it has been there itself before.
-            const bool rest = detections[d].segment == detections[other].segment &&
-                              (is_rest_of(host, detections[other], detections[d]) ||
-                               sets_off_with(host, detections[other], detections[d]));
-            const bool covered = host.drives() && share_inside(detections[d].box, box, 0.0) > kInsideVehicle;
-            if (!rest && !covered && candidates[d].motion * expected[t].motion < -0.2) continue;
-            if (!rest && !covered && is_backdrop(detections[d], candidates[d], detections[other], candidates[other]))
-                continue;
-            if (!rest && !covered && host.state() != DynamicState::kDynamic && passes_by(d, other)) continue;
-            if (height_gap_m(box, detections[d].box) > kMaxGap_m) continue;
-            double reach = rest ? kLimbMargin_m : kPartMargin_m;
-            if (guest != nullptr) {
-                const bool on_top = host.id() < guest->id() && stacked(detections[other].box, detections[d].box) &&
-                                    !is_body_beside(host, *guest);
-                const bool young = guest->hits() < kYoungHits && host.hits() >= 2 * guest->hits();
-                const bool piece =
-                    kLimb * detections[d].count < detections[other].count && is_limb_of(host, *guest, detections[d]);
-                if (!on_top && !young && !piece && !one_vehicle(host, *guest)) continue;
-                if (on_top) reach = kLimbMargin_m;
-            } else if (host.state() == DynamicState::kDynamic &&
-                       kLimb * detections[d].count < detections[other].count) {
-                reach = kLimbMargin_m;
-            }
-            if (host.drives())
-                reach = kSplinter * detections[d].count < detections[other].count ? kSplinterMargin_m : kLimbMargin_m;
-            const double distance_m = footprint_distance_m(box, detections[d].centroid_m);
-            if (distance_m < best * reach && share_inside(detections[d].box, box, reach) > kInside) {
-                best = distance_m / reach;
-                owner[d] = h.track;
-                limb[d] = distance_m > kPartMargin_m && !rest && !host.drives() ? 1 : 0;
-            }
+        const int own = owner[d];
+        PartFit best;
+        for (std::size_t h = 0; h < hosts.size(); ++h) {
+            if (track_of_host[h] == own) continue;
+            const auto fit = hosts[h].fit(detections[d], candidates[d], object(own), best.distance);
+            if (!fit) continue;
+            best = *fit;
+            owner[d] = track_of_host[h];
         }
+        limb[d] = best.limb ? 1 : 0;
         if (own >= 0 && owner[d] != own) {
-            give_way(static_cast<std::size_t>(own), objects[static_cast<std::size_t>(owner[d])],
-                     frame.detection.cleared);
+            give_way(static_cast<std::size_t>(own), *object(owner[d]), frame.detection.cleared);
         }
     }
 }
