@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "daemon/control/command_decoder.hpp"
 
 namespace dlod::daemon {
@@ -12,14 +14,15 @@ void CommandHandler::receive(std::span<const std::byte> message) {
         ++ignored_;
         return;
     }
-    const bool again = last_ && last_->id == command->id && last_->utime == command->utime;
-    if (!again) {
+    const auto is_again = [&](const Done& done) { return done.id == command->id && done.utime == command->utime; };
+    auto done = std::find_if(done_.begin(), done_.end(), is_again);
+    if (done == done_.end()) {
         ++commands_;
-        last_answer_ = carry_out(*command);
-        last_answer_.id = command->id;
-        last_ = command;
+        done = done_.begin() + static_cast<std::ptrdiff_t>(next_++ % done_.size());
+        *done = {command->id, command->utime, carry_out(*command)};
+        done->answer.id = command->id;
     }
-    answer_(*command, last_answer_);
+    answer_(*command, done->answer);
 }
 
 CommandAnswer CommandHandler::carry_out(const command_t& command) {

@@ -1,6 +1,7 @@
 // Commands, from the bytes of a message to the answer.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <dlod/command_t.hpp>
@@ -35,7 +36,8 @@ class CommandHandler {
         : actions_(std::move(actions)), answer_(std::move(answer)) {}
 
     /// Carries out the command in the message and answers it. What is no command is ignored and counted; a command
-    /// that was the last one already is only answered again.
+    /// that was among the last ones already is only answered again: senders repeat theirs until they are answered, and
+    /// those of several arrive in between.
     void receive(std::span<const std::byte> message);
 
     void visit_counters(const driver::CounterVisitor& visit) const {
@@ -44,12 +46,19 @@ class CommandHandler {
     }
 
   private:
+    /// A command that was carried out; none yet where it has no id.
+    struct Done {
+        std::optional<std::int64_t> id;
+        std::int64_t utime = 0;
+        CommandAnswer answer;
+    };
+
     CommandAnswer carry_out(const command_t& command);
 
     CommandActions actions_;
     std::function<void(const command_t&, const CommandAnswer&)> answer_;
-    std::optional<command_t> last_;
-    CommandAnswer last_answer_;
+    std::array<Done, 32> done_;  ///< the last ones
+    std::size_t next_ = 0;       ///< modulo their number: the place of the next one
     driver::Counter commands_;
     driver::Counter ignored_;  ///< messages that were no commands
 };

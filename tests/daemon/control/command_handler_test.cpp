@@ -139,6 +139,29 @@ TEST_F(CommandHandlerTest, ACommandThatIsSentAgainIsOnlyAnsweredAgain) {
     EXPECT_EQ(saved_.size(), 2U) << "the same id at another time is another command";
 }
 
+TEST_F(CommandHandlerTest, CommandsOfSeveralSendersAreCarriedOutOnceEach) {
+    // While the first one takes its time, all of them are sent again.
+    const std::vector<command_t> commands = {save_map(11, "hall"), save_map(12, "yard"), save_map(13, "bad")};
+    for (int time = 0; time < 3; ++time) {
+        for (const auto& command : commands) handler_.receive(encoded(command));
+    }
+    EXPECT_EQ(saved_, (std::vector<std::string>{"hall", "yard", "bad"}));
+    ASSERT_EQ(answers_.size(), 9U);
+    for (std::size_t i = 0; i < answers_.size(); ++i) {
+        EXPECT_EQ(answers_[i].id, commands[i % 3].id);
+        EXPECT_EQ(answers_[i].text, "map " + commands[i % 3].argument);
+    }
+    EXPECT_EQ(counter("commands"), 3U);
+}
+
+TEST_F(CommandHandlerTest, ManyCommandsAreCarriedOutEachOnce) {
+    for (int i = 0; i < 1000; ++i) handler_.receive(encoded(save_map(i, "hall")));
+    EXPECT_EQ(saved_.size(), 1000U);
+    handler_.receive(encoded(save_map(999, "hall")));
+    EXPECT_EQ(saved_.size(), 1000U);
+    EXPECT_EQ(answers_.back().id, 999);
+}
+
 TEST_F(CommandHandlerTest, WhatIsNoCommandIsIgnoredAndCounted) {
     std::mt19937 random(1);
     const Bytes good = encoded(save_map(11, "hall"));
