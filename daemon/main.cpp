@@ -151,6 +151,8 @@ int main(int argc, char** argv) {
         if (*info_command) code = info(info_file, info_metadata);
         if (*check_command) code = check_config(checked, checked_metadata);
         if (*print_command) code = print_config(printed, printed_metadata);
+        if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
+            throw OutputError("standard output cannot be written");
         return static_cast<int>(code);
     } catch (const ConfigError& error) {
         return fail(ExitCode::kConfiguration, error);

@@ -150,7 +150,8 @@ ExitCode replay(const ReplayArguments& arguments) {
         const auto event = signals.wait(pipeline.done_descriptor(), std::chrono::milliseconds(200));
         progress.show(progress_of.progress(), pipeline.finished_frames(), elapsed());
         if (messages) messages->report_if_due(pipeline, source);
-        if (event == SignalWaiter::Event::kStop) {
+        // There is nothing to reload: SIGHUP tells that the terminal has gone.
+        if (event == SignalWaiter::Event::kStop || event == SignalWaiter::Event::kReload) {
             interrupted = true;
             pipeline.stop();
         }
