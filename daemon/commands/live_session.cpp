@@ -46,7 +46,7 @@ std::int64_t monotonic_ns() {
 LiveSession::LiveSession(const Config& config, const driver::SensorInfo& sensor, const std::string& metadata,
                          const LiveStart& start)
     : config_(config),
-      utime_source_(config.lcm.utime_source),
+      utime_is_sensor_time_(config.lcm.utime_source == 1),
       description_(sensor.description()),
       start_(start),
       socket_(udp_options(config.sensor, sensor)),
@@ -84,8 +84,8 @@ void LiveSession::publish_pose(PipelineFrame& frame) {
     if (!messages_) return;
     host_time_.add(frame.header.stamp_ns, frame.header.receive_ns);
     report_clock_step();
-    const bool sensor_time = utime_source_.load(std::memory_order_relaxed) == 1;
-    const std::int64_t stamp_ns = sensor_time ? frame.header.stamp_ns : host_time_.next_stamp_ns(frame.header.stamp_ns);
+    const std::int64_t stamp_ns =
+        utime_is_sensor_time_ ? frame.header.stamp_ns : host_time_.next_stamp_ns(frame.header.stamp_ns);
     frame.utime_us = stamp_ns / 1000;
     messages_->publish_pose(frame, frame.utime_us);
 }
@@ -193,7 +193,6 @@ void LiveSession::judge_stream(const CounterList& counters, std::int64_t now_ns)
 
 void LiveSession::configure(const Config& config) {
     if (config.recording != config_.recording) recording_.configure(config.recording);
-    utime_source_.store(config.lcm.utime_source, std::memory_order_relaxed);
     config_ = config;
 }
 

@@ -1,7 +1,6 @@
 // One run on a live sensor: everything between its packets and the messages, and the reports on it.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -68,7 +67,7 @@ class LiveSession {
     void judge_stream(const CounterList& counters, std::int64_t now_ns);
 
     Config config_;  ///< of the thread that reports: publishing has what it needs beside it
-    std::atomic<int> utime_source_;
+    bool utime_is_sensor_time_;
     std::string description_;
     LiveStart start_;
     driver::UdpSource socket_;

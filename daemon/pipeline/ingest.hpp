@@ -20,8 +20,6 @@ class Ingest final : public Actor {
         bool live = false;   ///< never wait for a free frame: drop the oldest one that waits
         bool paced = false;  ///< the source waits for packets: that is not counted as time of ingest
     };
-    /// Called when frames were emitted or the source has ended.
-    using Wake = std::function<void()>;
 
     Ingest(driver::PacketSource& source, const driver::SensorInfo& sensor, const driver::FrameBuilderConfig& config,
            FramePool& pool, FrameQueue& out, IntakeStage& intake, EventCount& events, Options options);
