@@ -2,9 +2,11 @@
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <charconv>
 #include <cstring>
 
@@ -98,6 +100,23 @@ Endpoint from_socket_address(const sockaddr_storage& storage) {
         endpoint.port = ntohs(a.sin6_port);
     }
     return endpoint;
+}
+
+std::optional<IpAddress> source_address_for(const Endpoint& target) {
+    const int family = is_ipv4(target.address) ? AF_INET : AF_INET6;
+    const int fd = ::socket(family, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    if (fd < 0) return std::nullopt;
+    const SocketAddress there = to_socket_address(target, family);
+    sockaddr_storage here{};
+    socklen_t length = sizeof here;
+    // The kernel only looks up the route.
+    const bool routed = ::connect(fd, there.get(), there.length) == 0 &&
+                        ::getsockname(fd, reinterpret_cast<sockaddr*>(&here), &length) == 0;
+    const int reason = errno;
+    ::close(fd);
+    errno = reason;
+    if (!routed) return std::nullopt;
+    return from_socket_address(here).address;
 }
 
 }  // namespace dlod::driver

@@ -46,4 +46,8 @@ SocketAddress to_socket_address(const Endpoint& endpoint, int family);
 /// The address and port in `storage`, IPv4 as a mapped address.
 Endpoint from_socket_address(const sockaddr_storage& storage);
 
+/// The address of this host from which datagrams to `target` leave; nothing, and errno, where no route leads there.
+/// Nothing is sent.
+std::optional<IpAddress> source_address_for(const Endpoint& target);
+
 }  // namespace dlod::driver

@@ -7,12 +7,10 @@
 #include "daemon/commands/load_config.hpp"
 #include "daemon/doctor/checks.hpp"
 #include "daemon/doctor/packet_check.hpp"
+#include "daemon/publish/lcm_url.hpp"
 
 namespace dlod::daemon {
 namespace {
-
-/// What LCM takes an empty URL for.
-constexpr const char* kDefaultLcmUrl = "udpm://239.255.76.67:7667?ttl=0";
 
 /// Long enough to see one lost packet in a thousand.
 constexpr auto kPacketTime = std::chrono::seconds(4);
@@ -39,8 +37,7 @@ ExitCode doctor(const ConfigSources& sources) {
                                  check_clock_synchronised(),
                                  check_sensor(config.sensor.host, config.sensor.metadata),
                                  check_packets(config.sensor, kPacketTime)};
-    if (config.lcm.url.empty()) checks.push_back(check_multicast(kDefaultLcmUrl));
-    if (!config.lcm.url.empty() && config.lcm.url != "none") checks.push_back(check_multicast(config.lcm.url));
+    if (config.lcm.url != "none") checks.push_back(check_multicast(url_or_default(config.lcm.url)));
     // Room for an hour of results at 128 x 1024 and 10 Hz.
     constexpr std::uint64_t kResultBytes = 25'000'000'000;
     if (!config.output.folder.empty()) checks.push_back(check_disk(config.output.folder, kResultBytes));

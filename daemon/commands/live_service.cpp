@@ -89,25 +89,21 @@ void LiveService::reload_config() {
 void LiveService::begin_session_if_asked() {
     if (auto metadata = watch_->take_metadata()) {
         next_metadata_ = std::move(metadata);
+        session_trouble_.clear();
         if (session_) session_->stop();
     }
     if (!next_metadata_ || session_ || stopping_ || Clock::now() < next_attempt_) return;
     sensor_ = driver::parse_metadata(next_metadata_->json, next_metadata_->name);
-    for (const auto& warning : sensor_->warnings) spdlog::warn("{}", warning);
-    try {
-        config_ = load_config(sources_, &*sensor_);  // with the preset of this sensor
-    } catch (const ConfigError& error) {
-        spdlog::error("{}; the running configuration stays in force", error.what());
+    if (session_trouble_.empty()) {  // not with every attempt
+        for (const auto& warning : sensor_->warnings) spdlog::warn("{}", warning);
     }
+    load_config_for_session();
     try {
         session_ = std::make_unique<LiveSession>(config_, *sensor_, next_metadata_->json, start_);
     } catch (const MessageBusError& error) {
-        // The network may come up later than the service.
         postpone_session(error.what());
         return;
     } catch (const driver::SourceError& error) {
-        // So may the sensor's interface; another program may give up its port. By hand, that ends the program.
-        if (!start_.is_service && start_.sessions_before == 0) throw;
         postpone_session(error.what());
         return;
     }
@@ -117,7 +113,21 @@ void LiveService::begin_session_if_asked() {
     session_->start();
 }
 
+/// With the preset of its sensor.
+void LiveService::load_config_for_session() {
+    try {
+        config_ = load_config(sources_, &*sensor_);
+        config_trouble_.clear();
+    } catch (const ConfigError& error) {
+        if (std::exchange(config_trouble_, error.what()) == error.what()) return;
+        spdlog::error("{}; the running configuration stays in force", error.what());
+    }
+}
+
+/// In a handler. The network or the sensor's interface may come up later than the service, and another program may give
+/// up its port. By hand, that ends the program.
 void LiveService::postpone_session(const std::string& trouble) {
+    if (!start_.is_service && start_.sessions_before == 0) throw;
     session_trouble_ = trouble;
     service_.ready(session_trouble_);
     next_attempt_ = Clock::now() + kAttemptPeriod;

@@ -32,6 +32,7 @@ class LiveService {
     void handle(SignalWaiter::Event event);
     void reload_config();
     void begin_session_if_asked();
+    void load_config_for_session();
     void postpone_session(const std::string& trouble);
     void end_session();
     void report();
@@ -49,6 +50,7 @@ class LiveService {
     std::unique_ptr<LiveSession> session_;
     std::string trouble_;          ///< as logged last
     std::string session_trouble_;  ///< why there is no session although there are metadata
+    std::string config_trouble_;   ///< of the session's configuration, as logged last
     std::chrono::steady_clock::time_point next_attempt_{};
     bool stopping_ = false;
 };

@@ -6,6 +6,7 @@
 
 #include "daemon/commands/commands.hpp"
 #include "daemon/commands/load_config.hpp"
+#include "daemon/config/option.hpp"
 #include "daemon/pipeline/stage_times.hpp"
 #include "daemon/publish/lcm_bus.hpp"
 
@@ -41,6 +42,8 @@ class AnswerWaiter {
 
 ExitCode send_command(const SendArguments& arguments) {
     const Config config = load_config(arguments.config, nullptr);
+    if (config.lcm.url == "none") throw ConfigError("lcm.url: none; commands need one, that of the dlod that runs");
+    require_route(config.lcm.url);
     lcm::LCM lcm(config.lcm.url);
     if (!lcm.good()) throw MessageBusError("LCM cannot be opened: see dlod doctor");
     command_t command{};

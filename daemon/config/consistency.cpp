@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "daemon/config/option.hpp"
+#include "daemon/publish/lcm_url.hpp"
 #include "driver/network_address.hpp"
 
 namespace dlod::daemon {
@@ -74,7 +75,11 @@ void check_robot_body(const RobotBodyConfig& body) {
     }
 }
 
-void check_channels(const LcmConfig& lcm) {
+void check_lcm(const LcmConfig& lcm) {
+    if (!lcm.url.empty() && lcm.url != "none" && !has_lcm_provider(lcm.url)) {
+        throw ConfigError(
+            fmt::format("lcm.url: '{}' is none of LCM's; write udpm://239.255.76.67:7667?ttl=1, or none", lcm.url));
+    }
     if (lcm.channel_prefix.size() > kLongestChannel - kLongestSuffix) {
         throw ConfigError(fmt::format("lcm.channel_prefix: it has {} characters; LCM's channels allow for {}",
                                       lcm.channel_prefix.size(), kLongestChannel - kLongestSuffix));
@@ -95,7 +100,7 @@ void check_consistency(const Config& config) {
     }
     check_sensor(config.sensor);
     check_robot_body(config.robot_body);
-    check_channels(config.lcm);
+    check_lcm(config.lcm);
     const auto& obstacles = config.lcm.obstacles;
     if (obstacles.min_height_m >= obstacles.max_height_m) {
         throw ConfigError("lcm.obstacles.min_height_m: must be below lcm.obstacles.max_height_m");

@@ -12,6 +12,7 @@
 #include <thread>
 #include <utility>
 
+#include "daemon/publish/lcm_url.hpp"
 #include "daemon/service/log.hpp"
 #include "driver/stop_event.hpp"
 
@@ -55,7 +56,7 @@ bool CommandListener::State::wait(int descriptor, std::chrono::milliseconds time
 
 void CommandListener::State::listen() {
     do {
-        const Lcm lcm(::lcm_create(url.empty() ? nullptr : url.c_str()));
+        const Lcm lcm(has_route(url) ? ::lcm_create(url.empty() ? nullptr : url.c_str()) : nullptr);
         if (lcm) listen_until_failure(lcm.get());
         if (!wait(-1, std::chrono::milliseconds(0))) return;
         warnings.warn("deaf",

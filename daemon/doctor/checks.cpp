@@ -1,6 +1,5 @@
 #include "daemon/doctor/checks.hpp"
 
-#include <arpa/inet.h>
 #include <netinet/in.h>
 #include <sched.h>
 #include <sys/mman.h>
@@ -12,9 +11,9 @@
 
 #include <cerrno>
 #include <cstring>
-#include <regex>
 #include <string>
 
+#include "daemon/publish/lcm_url.hpp"
 #include "daemon/sensor/sensor_client.hpp"
 
 namespace dlod::daemon {
@@ -83,32 +82,20 @@ Check check_receive_buffer(int wanted_bytes) {
 
 Check check_multicast(const std::string& lcm_url) {
     Check check{"LCM multicast", Verdict::kGood, "", ""};
-    static const std::regex kUdpm(R"(udpm://([0-9.]+):([0-9]+)(?:\?(?:.*&)?ttl=([0-9]+).*)?(?:\?.*)?)");
-    std::smatch match;
-    in_addr group{};
-    if (!std::regex_match(lcm_url, match, kUdpm) || ::inet_pton(AF_INET, match[1].str().c_str(), &group) != 1 ||
-        !IN_MULTICAST(ntohl(group.s_addr))) {
+    const auto group = multicast_group_of(lcm_url);
+    if (!group) {
         return {check.name, Verdict::kWarning, "'" + lcm_url + "' is no multicast URL: nothing to check",
                 "lcm.url: udpm://239.255.76.67:7667?ttl=1"};
     }
-    const int ttl = match[3].matched ? std::stoi(match[3].str().substr(0, 4)) : 0;
-    const Socket socket;
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr = group;
-    address.sin_port = htons(static_cast<std::uint16_t>(std::stoul(match[2].str().substr(0, 6))));
-    if (::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-        return {check.name, Verdict::kFailure, "no route to " + match[1].str() + ": " + std::strerror(errno),
+    const auto local = driver::source_address_for(group->endpoint);
+    if (!local) {
+        return {check.name, Verdict::kFailure,
+                "no route to " + driver::to_string(group->endpoint.address) + ": " + std::strerror(errno),
                 "sudo ip route add 224.0.0.0/4 dev INTERFACE (with no network: sudo ip link set lo multicast on; "
                 "sudo ip route add 224.0.0.0/4 dev lo)"};
     }
-    sockaddr_in local{};
-    socklen_t length = sizeof local;
-    ::getsockname(socket.get(), reinterpret_cast<sockaddr*>(&local), &length);
-    char text[INET_ADDRSTRLEN] = "";
-    ::inet_ntop(AF_INET, &local.sin_addr, text, sizeof text);
-    check.finding = "messages leave by " + std::string(text) + " with ttl " + std::to_string(ttl);
-    if (ttl == 0) {
+    check.finding = "messages leave by " + driver::to_string(*local) + " with ttl " + std::to_string(group->ttl);
+    if (group->ttl == 0) {
         check.finding += ": they stay on this host";
         check.remedy = "for subscribers on other hosts: lcm.url with ?ttl=1";
     }

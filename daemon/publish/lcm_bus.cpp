@@ -3,15 +3,27 @@
 #include <fmt/format.h>
 #include <lcm/lcm.h>
 
+#include <cerrno>
+#include <cstring>
+
+#include "daemon/publish/lcm_url.hpp"
+
 namespace dlod::daemon {
 
-LcmBus::LcmBus(const std::string& url) : lcm_(::lcm_create(url.empty() ? nullptr : url.c_str())) {
+void require_route(const std::string& url) {
+    if (has_route(url)) return;
+    throw MessageBusError(
+        fmt::format("lcm.url '{}': LCM cannot be opened: no route for multicast: {}. Without a network: ip link set lo "
+                    "multicast on; ip route add 224.0.0.0/4 dev lo. To publish nothing: lcm.url none",
+                    url, std::strerror(errno)));
+}
+
+LcmBus::LcmBus(const std::string& url) {
+    require_route(url);
+    lcm_ = ::lcm_create(url.empty() ? nullptr : url.c_str());
     if (lcm_ == nullptr) {
-        throw MessageBusError(fmt::format(
-            "lcm.url '{}': LCM cannot be opened. Is the URL right, and is there a route for multicast? Without a "
-            "network: "
-            "ip link set lo multicast on; ip route add 224.0.0.0/4 dev lo. To publish nothing: lcm.url none",
-            url));
+        throw MessageBusError(
+            fmt::format("lcm.url '{}': LCM cannot be opened: is the URL right? To publish nothing: lcm.url none", url));
     }
 }
 

@@ -15,6 +15,9 @@ class MessageBusError : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
+/// @throws MessageBusError where the URL means a multicast group to which no route leads
+void require_route(const std::string& url);
+
 /// LCM, for publishing only: its receiving side tests itself for up to ten seconds where multicast does not work, and
 /// is made only for who subscribes.
 class LcmBus final : public MessageBus {
@@ -29,7 +32,7 @@ class LcmBus final : public MessageBus {
     bool publish(const std::string& channel, std::span<const std::byte> message) override;
 
   private:
-    _lcm_t* lcm_;
+    _lcm_t* lcm_ = nullptr;
 };
 
 }  // namespace dlod::daemon

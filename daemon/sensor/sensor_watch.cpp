@@ -220,11 +220,12 @@ class SensorWatch::Worker {
     void fall_back_on_cache(const std::string& host) {
         if (in_force_ || !cache_) return;
         const auto json = cache_->load();
-        if (!json) return;
+        if (!json || json == refused_) return;
         try {
             in_force_ = driver::parse_metadata(*json, cache_->path().string());
         } catch (const driver::MetadataError& error) {
             spdlog::warn("{}; the file is not used", error.what());
+            refused_ = json;
             return;
         }
         spdlog::warn("sensor {}: going on with the metadata that it gave last time", host);
@@ -262,6 +263,7 @@ class SensorWatch::Worker {
     // The thread's.
     std::optional<driver::SensorInfo> in_force_;
     std::string kept_;
+    std::optional<std::string> refused_;  ///< what the cache held that are no metadata
     Clock::time_point last_settings_{};
     Clock::time_point next_settings_{};
     Clock::duration contest_{};

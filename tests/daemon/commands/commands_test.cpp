@@ -206,15 +206,18 @@ TEST_F(CommandsTest, AReplayOntoAFullDiskSaysSo) {
 }
 
 TEST_F(CommandsTest, ASignalEndsAReplayWithAllOutputsComplete) {
-    test::ChildProcess child({DLOD_BINARY, "replay", capture_, "--out", file("interrupted"), "--rate", "0.2"});
-    for (int i = 0; i < 500; ++i) {
-        std::error_code error;
-        if (std::filesystem::file_size(folder_->path() / "interrupted/labels.bin", error) > 0 && !error) break;
-        ::usleep(10'000);
+    for (const int signal : {SIGINT, SIGHUP}) {  // the terminal's keys, and its end
+        const auto out = folder_->path() / ("interrupted_" + std::to_string(signal));
+        test::ChildProcess child({DLOD_BINARY, "replay", capture_, "--out", out.string(), "--rate", "0.2"});
+        for (int i = 0; i < 500; ++i) {
+            std::error_code error;
+            if (std::filesystem::file_size(out / "labels.bin", error) > 0 && !error) break;
+            ::usleep(10'000);
+        }
+        child.signal(signal);
+        EXPECT_EQ(child.wait(test::kTooSlowForTimes ? 30s : 5s), 7) << child.output();
+        EXPECT_TRUE(std::filesystem::exists(out / "map.pcd"));
     }
-    child.signal(SIGINT);
-    EXPECT_EQ(child.wait(test::kTooSlowForTimes ? 30s : 5s), 7) << child.output();
-    EXPECT_TRUE(std::filesystem::exists(folder_->path() / "interrupted/map.pcd"));
 }
 
 TEST_F(CommandsTest, LcmWithoutAMulticastRouteIsAnErrorAtOnce) {
@@ -223,6 +226,27 @@ TEST_F(CommandsTest, LcmWithoutAMulticastRouteIsAnErrorAtOnce) {
         {"unshare", "-r", "-n", DLOD_BINARY, "replay", capture_, "--lcm", "udpm://239.255.76.98:17668?ttl=0"});
     EXPECT_EQ(child.wait(5s), 6) << child.output();
     EXPECT_NE(child.output().find("224.0.0.0/4"), std::string::npos) << child.output();
+    // So it is for who starts a live run by hand, and for who sends a command: in one line, and not in LCM's words.
+    for (const std::vector<std::string>& command :
+         {std::vector<std::string>{"run", "--metadata", file("drive.json")}, {"command", "restart-odometry"}}) {
+        std::vector<std::string> line = {"unshare", "-r", "-n", DLOD_BINARY};
+        line.insert(line.end(), command.begin(), command.end());
+        test::ChildProcess other(line);
+        EXPECT_EQ(other.wait(5s), 6) << other.output();
+        EXPECT_NE(other.output().find("224.0.0.0/4"), std::string::npos) << other.output();
+        EXPECT_EQ(other.output().find("requires a valid multicast route"), std::string::npos) << other.output();
+    }
+}
+
+TEST_F(CommandsTest, CommandsNeedLcm) {
+    EXPECT_TRUE(ends(dlod({"command", "restart-odometry", "--lcm", "none"}), 3, {"lcm.url"}));
+    EXPECT_TRUE(ends(dlod({"command", "restart-odometry", "--lcm", "239.255.76.67:7667"}), 3, {"lcm.url", "udpm://"}));
+}
+
+TEST_F(CommandsTest, WhatCannotBePrintedIsAnError) {
+    test::ChildProcess child({"sh", "-c", DLOD_BINARY " print-config > /dev/full"});
+    EXPECT_EQ(child.wait(5s), 5) << child.output();
+    EXPECT_NE(child.output().find("standard output"), std::string::npos) << child.output();
 }
 
 }  // namespace

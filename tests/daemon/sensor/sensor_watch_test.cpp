@@ -7,6 +7,7 @@
 
 #include "daemon/config/option.hpp"
 #include "daemon/sensor/metadata_cache.hpp"
+#include "daemon/service/log.hpp"
 #include "driver/metadata.hpp"
 #include "tests/support/fake_sensor.hpp"
 
@@ -68,6 +69,23 @@ TEST_F(SensorWatchTest, ASensorThatIsSlowToComeUpIsAwaited) {
     EXPECT_EQ(serial_of(awaited(watch)), "123456");
     EXPECT_TRUE(
         eventually([&] { return watch.trouble().empty() || watch.trouble().find("INIT") == std::string::npos; }));
+}
+
+TEST_F(SensorWatchTest, AKeptFileThatIsDamagedIsNamedOnce) {
+    MetadataCache(folder_.path(), config_.host).store("{\"beam_altitude");
+    sensor_.answers = false;
+    set_up_log(2);
+    testing::internal::CaptureStderr();
+    {
+        SensorWatch watch = this->watch();
+        EXPECT_TRUE(says(watch, sensor_.host()));
+        std::this_thread::sleep_for(200ms);
+        EXPECT_FALSE(watch.take_metadata().has_value());
+    }
+    const std::string log = testing::internal::GetCapturedStderr();
+    const auto at = log.find("the file is not used");
+    EXPECT_NE(at, std::string::npos) << log;
+    EXPECT_EQ(log.find("the file is not used", at + 1), std::string::npos) << log;
 }
 
 TEST_F(SensorWatchTest, WhatItGaveLastTimeServesWhileItDoesNotAnswer) {
