@@ -31,71 +31,19 @@ describe() {  # CASE
     esac
 }
 
-# "percent valid, largest error in mm and degrees, longest time without pose in s" of one replay
-score() {  # DRIVE USE_IMU
+# Percent valid, worst valid pose and longest time without one, of one replay
+score() {  # DRIVE USE_IMU CLOCK_STEP_S
     "$build/daemon/dlod" replay "$1.pcap" --set log.level=error --set "odometry.use_imu=$2" --out "$work/run" >/dev/null
-    awk '
-        # c = a * b of quaternions x y z w
-        function multiply(a, b, c) {
-            c[1] = a[4] * b[1] + a[1] * b[4] + a[2] * b[3] - a[3] * b[2]
-            c[2] = a[4] * b[2] + a[2] * b[4] + a[3] * b[1] - a[1] * b[3]
-            c[3] = a[4] * b[3] + a[3] * b[4] + a[1] * b[2] - a[2] * b[1]
-            c[4] = a[4] * b[4] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
-        }
-        function invert(a, c) { for (k = 1; k < 4; ++k) c[k] = -a[k]; c[4] = a[4] }
-        function rotate(q, v, c,    p, t, i) {
-            for (k = 1; k < 4; ++k) p[k] = v[k]
-            p[4] = 0; multiply(q, p, t); invert(q, i); multiply(t, i, c)
-        }
-        function read_pose(line, q, t,    f, i) {
-            split(line, f, " ")
-            for (i = 1; i < 4; ++i) t[i] = f[i + 1]
-            for (i = 1; i < 5; ++i) q[i] = f[i + 4]
-        }
-        # The true pose at a time, between two of the known ones.
-        function true_pose(time, q, t,    i, share, q1, t1) {
-            while (at > 1 && when[at] > time) --at
-            while (at < known - 1 && when[at + 1] <= time) ++at
-            share = (time - when[at]) / (when[at + 1] - when[at])
-            read_pose(truth[at], q, t); read_pose(truth[at + 1], q1, t1)
-            sign = q[1] * q1[1] + q[2] * q1[2] + q[3] * q1[3] + q[4] * q1[4] < 0 ? -1 : 1
-            for (i = 1; i < 4; ++i) t[i] += share * (t1[i] - t[i])
-            for (i = 1; i < 5; ++i) q[i] += share * (sign * q1[i] - q[i])
-            sign = sqrt(q[1] ^ 2 + q[2] ^ 2 + q[3] ^ 2 + q[4] ^ 2)
-            for (i = 1; i < 5; ++i) q[i] /= sign
-        }
-        BEGIN { at = 1 }
-        FNR == 1 { ++part }
-        part == 1 { truth[++known] = $0; when[known] = $1 - 1.7e9; next }  # first, middle and last of each turn
-        part == 2 {
-            split($0, f, ",")
-            if (FNR == 2) first_id = f[2]
-            if (FNR > 1) { ++frames; last_column[sprintf("%.4f", f[3] / 1e9 - 1.7e9)] = when[3 * (f[2] - first_id + 1)] }
-            next
-        }
-        {
-            stamp = $1 - 1.7e9; turn_s = last_column[sprintf("%.4f", stamp)]
-            if (stamp - turn_s > 0.5 || turn_s - stamp > 0.5) stamp -= clock
-            true_pose(stamp, true_q, true_t); read_pose($0, q, t)
-            if (FNR == 1) {
-                invert(q, i); multiply(true_q, i, align)
-                for (k = 1; k < 4; ++k) { first_t[k] = t[k]; first_true_t[k] = true_t[k] }
-            } else if (stamp - last > longest) longest = stamp - last
-            last = stamp; ++valid
-            for (k = 1; k < 4; ++k) v[k] = t[k] - first_t[k]
-            rotate(align, v, moved)
-            e = 0
-            for (k = 1; k < 4; ++k) e += (moved[k] + first_true_t[k] - true_t[k]) ^ 2
-            if (e > worst) worst = e
-            multiply(align, q, r); invert(true_q, i); multiply(i, r, d)
-            sine = sqrt(d[1] ^ 2 + d[2] ^ 2 + d[3] ^ 2)
-            angle = 2 * atan2(sine, d[4] < 0 ? -d[4] : d[4]) * 57.29578
-            if (angle > worst_angle) worst_angle = angle
-        }
+    if [[ ! -s $work/run/trajectory.tum ]]; then
+        printf ' 0 %% | | |'
+        return
+    fi
+    "$build/tools/eval/dlod-eval" "$1_truth" "$work/run" --clock-step "$3" --json | awk '
+        /": / { gsub(/[",:]/, ""); if (!($1 in value)) value[$1] = $2 }
         END {
-            printf " %.0f %% | %.0f mm, %.2f deg | %.1f s |", 100 * valid / frames, 1000 * sqrt(worst), worst_angle, longest
-        }
-    ' clock="$3" <(sort -n "$1_truth"/poses_*tum.txt) "$work/run/frames.csv" "$work/run/trajectory.tum"
+            printf " %.0f %% | %.0f mm, %.2f deg | %.1f s |", value["valid_pct"], 1000 * value["worst_m"],
+                   value["worst_deg"], value["longest_gap_s"]
+        }'
 }
 
 echo '| drive | with IMU: valid | worst valid pose | longest without pose | without IMU: valid | worst valid pose | longest without pose |'

@@ -50,9 +50,14 @@ std::string text_of(const Json& value) {
 
 }  // namespace
 
-Evaluation evaluate(const Truth& truth, const RunOutput& run, const EvaluationOptions& options) {
+Evaluation evaluate(const Truth& truth, RunOutput run, const EvaluationOptions& options) {
+    if (options.clock_step_s != 0.0) undo_clock_step(run, truth, options.clock_step_s);
     Evaluation evaluation;
     evaluation.trajectory = score_trajectory(truth, run.trajectory);
+    if (!run.frames.empty()) {
+        evaluation.trajectory.valid_pct =
+            100.0 * static_cast<double>(run.trajectory.size()) / static_cast<double>(run.frames.size());
+    }
     const Eigen::Isometry3d& T_true_run = evaluation.trajectory.T_true_run_by_rotation;
     if (std::filesystem::exists(run.folder / "labels.bin")) evaluation.masks = score_masks(truth, run, options.skip);
     if (run.has_tracks && !truth.objects.empty()) {

@@ -14,6 +14,7 @@ namespace dlod::tools {
 struct EvaluationOptions {
     double range_m = 25.0;      ///< of tracks; masks are scored within the range that near.bin was made for
     double far_range_m = 50.0;  ///< of tracks, scored once more
+    double clock_step_s = 0.0;  ///< by which the sensor's clock was set during the drive
     int skip = 10;              ///< frames of start-up left out of mask and track scores
 };
 
@@ -26,7 +27,7 @@ struct Evaluation {
 };
 
 /// Throws std::runtime_error naming the file that is missing or malformed.
-Evaluation evaluate(const Truth& truth, const RunOutput& run, const EvaluationOptions& options);
+Evaluation evaluate(const Truth& truth, RunOutput run, const EvaluationOptions& options);
 
 std::string to_json(const Evaluation& evaluation);
 /// One line a score: `trajectory: poses=100  ...`, and one for each row of the table of the tracks' motion errors.

@@ -39,6 +39,8 @@ int main(int argc, char** argv) {
     app.add_option("--skip", options.skip, "frames of start-up left out of mask and track scores")
         ->check(CLI::NonNegativeNumber)
         ->capture_default_str();
+    app.add_option("--clock-step", options.clock_step_s,
+                   "seconds by which the sensor's clock was set during the drive (dlod-sim --clock-step)");
     app.add_option("--errors", errors_file, "also write the pose errors over time to this CSV file");
     app.add_flag("--json", json, "JSON instead of text");
     if (const auto code = dlod::tools::parse_command_line(app, argc, argv)) return *code;

@@ -134,10 +134,16 @@ TrajectoryScore score_trajectory(const Truth& truth, const PoseSeries& run) {
         score.rpe1s_m = std::sqrt(squared_m / pairs);
         score.rpe1s_deg = std::sqrt(squared_deg / pairs);
     }
-    if (score.path_m > kShortestForDrift_m) {
-        const Eigen::Isometry3d last = poses.front().truth * poses.front().run.inverse() * poses.back().run;
-        score.drift_pct = 100.0 * (last.translation() - poses.back().truth.translation()).norm() / score.path_m;
+    const Eigen::Isometry3d T_true_first = poses.front().truth * poses.front().run.inverse();
+    double last_m = 0.0;
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+        const Eigen::Isometry3d pose = T_true_first * poses[i].run;
+        last_m = (pose.translation() - poses[i].truth.translation()).norm();
+        score.worst_m = std::max(score.worst_m, last_m);
+        score.worst_deg = std::max(score.worst_deg, angle_deg(poses[i].truth.inverse() * pose));
+        if (i > 0) score.longest_gap_s = std::max(score.longest_gap_s, poses[i].stamp_s - poses[i - 1].stamp_s);
     }
+    if (score.path_m > kShortestForDrift_m) score.drift_pct = 100.0 * last_m / score.path_m;
     return score;
 }
 

@@ -23,7 +23,11 @@ struct TrajectoryScore {
     std::optional<double> rpe1s_m;  ///< relative pose error over 1 s, RMSE; nothing when the run is shorter
     std::optional<double> rpe1s_deg;
     std::optional<double>
-        drift_pct;  ///< error of the end, seen from the first pose, per path; nothing below 1 m of path
+        drift_pct;               ///< error of the end, seen from the first pose, per path; nothing below 1 m of path
+    double worst_m = 0.0;        ///< largest error of a pose, seen from the first one
+    double worst_deg = 0.0;      ///< likewise
+    double longest_gap_s = 0.0;  ///< between two poses that follow each other
+    std::optional<double> valid_pct;  ///< frames of the run that have a pose; nothing where its frames are not known
 
     std::vector<PoseError> errors;  ///< by pose
     /// From the run's world to the true one: by position for the trajectory, by rotation (well posed on straight paths
@@ -40,6 +44,10 @@ struct TrajectoryScore {
         v("rpe1s_m", rpe1s_m);
         v("rpe1s_deg", rpe1s_deg);
         v("drift_pct", drift_pct);
+        v("worst_m", worst_m);
+        v("worst_deg", worst_deg);
+        v("longest_gap_s", longest_gap_s);
+        v("valid_pct", valid_pct);
     }
 };
 

@@ -67,6 +67,71 @@ TEST(Evaluation, DriftIsTheErrorOfTheEndSeenFromTheFirstPose) {
     EXPECT_NEAR(e.trajectory.drift_pct.value(), 100.0 * 0.1 / e.trajectory.path_m, 1e-4);
 }
 
+TEST(Evaluation, TheWorstPoseIsSeenFromTheFirst) {
+    SmallDrive drive;
+    drive.run_poses[7].translation().z() += 0.3;
+    drive.run_poses[12].rotate(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX()));
+    const TrajectoryScore score = evaluation_of(drive).trajectory;
+    EXPECT_NEAR(score.worst_m, 0.3, 1e-6);
+    EXPECT_NEAR(score.worst_deg, 0.1 * 180.0 / std::numbers::pi, 1e-4);
+    EXPECT_LT(score.ate_m, 0.1);
+}
+
+TEST(Evaluation, FramesWithoutAPoseAreCountedAndTimed) {
+    const SmallDrive drive;
+    drive.write();
+    std::ifstream whole(drive.run_folder / "trajectory.tum");
+    std::string kept;
+    std::string line;
+    for (int k = 0; std::getline(whole, line); ++k) kept += k >= 4 && k < 9 ? "" : line + "\n";
+    std::ofstream(drive.run_folder / "trajectory.tum") << kept;
+    const auto score = evaluate(Truth(drive.truth_folder), RunOutput(drive.run_folder), {}).trajectory;
+    EXPECT_NEAR(score.valid_pct.value(), 75.0, 1e-9);
+    EXPECT_NEAR(score.longest_gap_s, 0.6, 1e-6);
+    EXPECT_NEAR(score.worst_m, 0.0, 1e-6);
+}
+
+TEST(Evaluation, AClockThatIsSetDuringTheDriveIsAllowedFor) {
+    for (const double step_s : {-1.03, 2.03}) {
+        const SmallDrive drive;
+        drive.write();
+        // From frame 8 on, pose and frame are stamped by the clock that was set.
+        const auto shift = [&](const char* name, char separator, int column, double unit) {
+            std::ifstream in(drive.run_folder / name);
+            std::string all;
+            std::string line;
+            if (column > 0) {
+                std::getline(in, line);
+                all = line + "\n";
+            }
+            for (int k = 0; std::getline(in, line); ++k) {
+                std::size_t begin = 0;
+                for (int c = 0; c < column; ++c) begin = line.find(separator, begin) + 1;
+                const std::size_t end = line.find(separator, begin);
+                if (k >= 8) {
+                    char stamp[40];
+                    std::snprintf(
+                        stamp, sizeof stamp, unit == 1.0 ? "%.9Lf" : "%.0Lf",
+                        std::stold(line.substr(begin, end - begin)) + static_cast<long double>(unit * step_s));
+                    line.replace(begin, end - begin, stamp);
+                }
+                all += line + "\n";
+            }
+            std::ofstream(drive.run_folder / name) << all;
+        };
+        shift("trajectory.tum", ' ', 0, 1.0);
+        shift("frames.csv", ',', 2, 1e9);
+        const Truth truth(drive.truth_folder);
+        const Evaluation e = evaluate(truth, RunOutput(drive.run_folder), {.clock_step_s = step_s});
+        EXPECT_EQ(e.trajectory.poses, SmallDrive::kFrames) << step_s;
+        EXPECT_NEAR(e.trajectory.worst_m, 0.0, 1e-5) << step_s;
+        EXPECT_NEAR(e.trajectory.longest_gap_s, 0.1, 1e-5) << step_s;
+        EXPECT_EQ(e.masks->true_positives, 60) << step_s;
+        const TrajectoryScore as_stamped = evaluate(truth, RunOutput(drive.run_folder), {}).trajectory;
+        EXPECT_TRUE(as_stamped.poses < SmallDrive::kFrames || as_stamped.worst_m > 0.1) << step_s;
+    }
+}
+
 TEST(Evaluation, RunOutsideOfTheDriveIsAnError) {
     const SmallDrive drive;
     drive.write();
