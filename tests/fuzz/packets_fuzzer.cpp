@@ -58,9 +58,10 @@ void run(dlod::fuzz::Input& input, const SyntheticSensor& sensor) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-    static const SyntheticSensor legacy({.profile = "LEGACY"});
+    // Few pixels: what the input decides is in the headers.
+    static const SyntheticSensor legacy({.profile = "LEGACY", .rows = 4, .columns = 128});
     static const SyntheticSensor dual(
-        {.profile = "RNG19_RFL8_SIG16_NIR16_DUAL", .window_first = 480, .window_last = 31});
+        {.profile = "RNG19_RFL8_SIG16_NIR16_DUAL", .rows = 4, .columns = 128, .window_first = 96, .window_last = 31});
     dlod::fuzz::Input input(data, size);
     run(input, (input.u8() & 1U) != 0 ? legacy : dual);
     return 0;

@@ -3,6 +3,7 @@
 #include <dlod/command_t.hpp>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -79,9 +80,21 @@ void write_commands(const std::filesystem::path& folder) {
     }
 }
 
+/// Every key, a file a group, without the comments: whole files are read too slowly to try many.
 void write_configurations(const std::filesystem::path& folder) {
-    const std::string all = daemon::to_yaml({});
-    write(folder, "all", all.data(), all.size());
+    std::istringstream all(daemon::to_yaml({}));
+    std::string group;
+    int groups = 0;
+    const auto write_group = [&] {
+        if (!group.empty()) write(folder, "group" + std::to_string(groups++), group.data(), group.size());
+        group.clear();
+    };
+    for (std::string line; std::getline(all, line);) {
+        if (line.empty() || line[line.find_first_not_of(' ')] == '#') continue;
+        if (line[0] != ' ') write_group();
+        group += line + '\n';
+    }
+    write_group();
     for (const std::string text : {"sensor: {metadata: a.json, lidar_port: 7502}\nlcm: {url: none}\n",
                                    "robot_body:\n  boxes_m: [0, 0, 0, 1, 1, 1]\npipeline: {pin_to_cpus: [0, 1]}\n",
                                    "extrinsics: &a {rotation_wxyz: [1, 0, 0, 0]}\nodometry: {use_imu: off}\n"}) {
