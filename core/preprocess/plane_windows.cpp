@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numbers>
 
@@ -17,6 +18,14 @@ void invert_ranges(const std::uint32_t* __restrict range_mm, float* __restrict i
         inverse[c] = distance > 1e-2F ? 1.0F / distance : 0.0F;
     }
 }
+
+constexpr float kLeastInverse = 1e-4F;  // of a plane, 1/m
+/// Inverse range of a pixel whose column is missing.
+constexpr float kMissing = -1.0F;
+// A window of which a part is missing has to have pixels in so many rows and columns, or the plane could not fail to
+// fit, and the slopes may be so many times less certain than those of a whole one, as variances.
+constexpr int kLeastLines = 3;
+constexpr double kMostVariance = 9.0;
 
 /// Eight windows side by side, in registers.
 constexpr int kLanes = 8;
@@ -46,13 +55,22 @@ void fit_windows(const float* const* __restrict pixels, const float (*__restrict
         *reinterpret_cast<Lanes*>(slope_azimuth + start) = b;
         *reinterpret_cast<Lanes*>(slope_altitude + start) = g;
         for (int l = 0; l < kLanes; ++l) {
-            const bool whole = low[l] > 0.0F && a[l] > 1e-4F;
+            const bool whole = low[l] > 0.0F && a[l] > kLeastInverse;
             inverse[start + l] = whole ? a[l] : 0.0F;
             // d(range) = d(inverse) / inverse^2
             deviation[start + l] =
                 whole ? std::sqrt(squares[l] * (1.0F / static_cast<float>(kWindowPixels))) / (a[l] * a[l]) : 0.0F;
         }
     }
+}
+
+/// @param fit offset and two slopes of the firing time and of the three components of the origin
+WindowFiring firing_of(const Eigen::Matrix<double, 3, 4>& fit) {
+    const Eigen::Matrix<float, 3, 4> f = fit.cast<float>();
+    WindowFiring firing;
+    firing.time = {f(0, 0), f(1, 0), f(2, 0)};
+    for (int i = 0; i < 3; ++i) firing.origin[i] = {f(0, i + 1), f(1, i + 1), f(2, i + 1)};
+    return firing;
 }
 
 }  // namespace
@@ -110,15 +128,15 @@ PlaneWindows::PlaneWindows(const SensorModel& sensor, int column_step)
             fired(k, 1) = radial * std::cos(alt0);
             fired(k, 2) = static_cast<double>(sensor.beam_origin_m) * (std::sin(encoder) - std::sin(encoder0));
             fired(k, 3) = -radial * std::sin(alt0);
+            for (int i = 0; i < 4; ++i) model.fired[k][i] = static_cast<float>(fired(k, i));
             model.scale[k] = static_cast<float>(1.0 / depth);
             model.azimuth[k] = static_cast<float>(X(k, 1));
             model.altitude[k] = static_cast<float>(X(k, 2));
         }
-        const Eigen::Matrix<double, 3, kWindowPixels> solver =
-            (X.transpose() * X + 1e-12 * Eigen::Matrix3d::Identity()).inverse() * X.transpose();
-        const Eigen::Matrix<float, 3, 4> firing = (solver * fired).cast<float>();
-        model.firing.time = {firing(0, 0), firing(1, 0), firing(2, 0)};
-        for (int i = 0; i < 3; ++i) model.firing.origin[i] = {firing(0, i + 1), firing(1, i + 1), firing(2, i + 1)};
+        const Eigen::Matrix3d covariance = (X.transpose() * X + 1e-12 * Eigen::Matrix3d::Identity()).inverse();
+        const Eigen::Matrix<double, 3, kWindowPixels> solver = covariance * X.transpose();
+        model.firing = firing_of(solver * fired);
+        for (int i = 0; i < 2; ++i) model.slope_variance[i] = covariance(i + 1, i + 1);
         for (int i = 0; i < 3; ++i) {
             for (int k = 0; k < kWindowPixels; ++k) {
                 model.weight[i][k] = static_cast<float>(solver(i, k)) * model.scale[k];
@@ -142,8 +160,16 @@ PlaneWindows::PlaneWindows(const SensorModel& sensor, int column_step)
 
 void PlaneWindows::load(const Frame& frame) {
     const int w = sensor_.width;
+    missing_.clear();
+    for (int m = 0; frame.header.valid_columns < w && m < w; ++m) {
+        if (!frame.columns.valid[static_cast<std::size_t>(m)]) missing_.push_back(m);
+    }
     for (int r = 0; r < sensor_.height; ++r) {
         invert_ranges(frame.raw.range_mm.row(r), row_.data(), w, sensor_.beam_origin_m);
+        for (const int m : missing_) {
+            const int shifted = m + sensor_.pixel_shift[static_cast<std::size_t>(r)];
+            row_[static_cast<std::size_t>((shifted % w + w) % w)] = kMissing;
+        }
         for (int p = 0; p < column_step_; ++p) {
             float* part = part_of(r, p);
             for (int i = 0; i < windows_; ++i)
@@ -158,26 +184,93 @@ void PlaneWindows::load(const Frame& frame) {
     }
 }
 
+void PlaneWindows::find_pixels(int row, const float* (&pixels)[kWindowPixels]) const {
+    const int first_row = model_[static_cast<std::size_t>(row)].first_row;
+    for (int k = 0; k < kWindowPixels; ++k) {
+        const int offset = k % kWindowSide - kWindowRadius;
+        const int turns = offset >= 0 ? offset / column_step_ : -((column_step_ - 1 - offset) / column_step_);
+        const int part = offset - turns * column_step_;
+        pixels[k] = part_of(std::min(first_row + k / kWindowSide, sensor_.height - 1), part) + kWindowRadius + turns;
+    }
+}
+
 void PlaneWindows::fit_row(int row, PlaneRow& planes) const {
     const auto count = static_cast<std::size_t>(windows_);
     for (auto* values : {&planes.inverse_range, &planes.slope_azimuth, &planes.slope_altitude, &planes.deviation_m}) {
         values->resize(count + kLanes);
     }
+    planes.partial.clear();
+    planes.partial.reserve(count);
     const RowModel& model = model_[static_cast<std::size_t>(row)];
     const float* pixels[kWindowPixels];
-    for (int k = 0; k < kWindowPixels; ++k) {
-        const int offset = k % kWindowSide - kWindowRadius;
-        const int turns = offset >= 0 ? offset / column_step_ : -((column_step_ - 1 - offset) / column_step_);
-        const int part = offset - turns * column_step_;
-        pixels[k] =
-            part_of(std::min(model.first_row + k / kWindowSide, sensor_.height - 1), part) + kWindowRadius + turns;
-    }
+    find_pixels(row, pixels);
     fit_windows(pixels, model.weight, model.scale, model.azimuth, model.altitude, windows_, planes.inverse_range.data(),
                 planes.slope_azimuth.data(), planes.slope_altitude.data(), planes.deviation_m.data());
     const auto& usable = usable_[static_cast<std::size_t>(row)];
     for (std::size_t i = 0; i < count; ++i) {
         if (!usable[i]) planes.inverse_range[i] = 0.0F;
     }
+    if (missing_.empty()) return;
+    for (std::size_t i = 0; i < count; ++i) {
+        if (usable[i] && planes.inverse_range[i] <= 0.0F) fit_partial(row, static_cast<int>(i), pixels, planes);
+    }
+}
+
+/// Fits a window of which columns are missing to the pixels that came, if these suffice.
+void PlaneWindows::fit_partial(int row, int window, const float* const* pixels, PlaneRow& planes) const {
+    const RowModel& model = model_[static_cast<std::size_t>(row)];
+    const auto at = static_cast<std::size_t>(window);
+    const int centre = (row - model.first_row) * kWindowSide + kWindowRadius;
+    if (pixels[centre][at] <= 0.0F) return;
+    float inverse_depth[kWindowPixels];
+    float weight[kWindowPixels];  // 1 of what came, else 0
+    unsigned came = 0;            // bit by pixel
+    bool returned = true;
+    for (int k = 0; k < kWindowPixels; ++k) {
+        const float value = pixels[k][at];
+        returned &= value != 0.0F;
+        weight[k] = value > 0.0F ? 1.0F : 0.0F;
+        came |= static_cast<unsigned>(value > 0.0F) << k;
+        inverse_depth[k] = value * model.scale[k];
+    }
+    constexpr unsigned kLine = (1U << kWindowSide) - 1;
+    int rows = 0;
+    unsigned columns = 0;
+    for (int r = 0; r < kWindowSide; ++r) {
+        const unsigned line = (came >> (r * kWindowSide)) & kLine;
+        rows += line != 0 ? 1 : 0;
+        columns |= line;
+    }
+    const int count = std::popcount(came);
+    if (!returned || count == kWindowPixels || rows < kLeastLines || std::popcount(columns) < kLeastLines) return;
+    // Sums over the pixels of x (x, inverse depth) and of x (when, from where), with x = (1, along row, up).
+    Eigen::Matrix<float, 4, 3> sums = Eigen::Matrix<float, 4, 3>::Zero();
+    Eigen::Matrix<float, 4, 3> fired = Eigen::Matrix<float, 4, 3>::Zero();
+    for (int k = 0; k < kWindowPixels; ++k) {
+        const float u = model.azimuth[k];
+        const float v = model.altitude[k];
+        const Eigen::RowVector3f x(weight[k], weight[k] * u, weight[k] * v);
+        sums += Eigen::Vector4f(1.0F, u, v, inverse_depth[k]) * x;
+        fired += Eigen::Map<const Eigen::Vector4f>(model.fired[k]) * x;
+    }
+    const Eigen::Matrix3d covariance = sums.topRows<3>().cast<double>().inverse();
+    for (int i = 0; i < 2; ++i) {
+        if (!(covariance(i + 1, i + 1) < kMostVariance * model.slope_variance[i])) return;
+    }
+    const Eigen::Vector3f plane = (covariance * sums.row(3).transpose().cast<double>()).cast<float>();
+    if (plane[0] <= kLeastInverse) return;
+    float squares = 0.0F;
+    for (int k = 0; k < kWindowPixels; ++k) {
+        const float e = inverse_depth[k] - (plane[0] + model.azimuth[k] * plane[1] + model.altitude[k] * plane[2]);
+        squares += weight[k] * e * e;
+    }
+    planes.inverse_range[at] = plane[0];
+    planes.slope_azimuth[at] = plane[1];
+    planes.slope_altitude[at] = plane[2];
+    // As large as that of all pixels would be: three parameters have been fitted to fewer.
+    const float share = static_cast<float>(kWindowPixels - 3) / static_cast<float>(kWindowPixels * (count - 3));
+    planes.deviation_m[at] = std::sqrt(squares * share) / (plane[0] * plane[0]);
+    planes.partial.push_back({window, firing_of(covariance * fired.transpose().cast<double>())});
 }
 
 BeamFrame PlaneWindows::beam(int row, int measurement) const {

@@ -3,6 +3,9 @@
 // On a plane the inverse range along a beam is linear in the beam's tangent-plane coordinates, and these are constants
 // of the row: normal and smoothed range of a window are fixed linear combinations of its inverse ranges, no eigenvalues
 // and no neighbour search. The noise of a lidar lies along the beam, so this is also the maximum-likelihood fit.
+//
+// Where columns are missing, because their packets were lost, the same fit is done with the pixels that came, if these
+// spread enough to tell the plane.
 #pragma once
 
 #include <vector>
@@ -15,15 +18,6 @@ namespace dlod {
 inline constexpr int kWindowRadius = 2;
 inline constexpr int kWindowSide = 2 * kWindowRadius + 1;
 inline constexpr int kWindowPixels = kWindowSide * kWindowSide;
-
-/// The planes around every column_step-th pixel of one row. A window with a missing pixel, or with pixels a turn apart
-/// in time (the seam), has inverse range 0.
-struct PlaneRow {
-    AlignedVector<float> inverse_range;   ///< [W / column_step] smoothed, 1/m, from the beam's origin
-    AlignedVector<float> slope_azimuth;   ///< derivative of the inverse range along the row, towards growing columns
-    AlignedVector<float> slope_altitude;  ///< the same upwards
-    AlignedVector<float> deviation_m;     ///< root mean square deviation of the ranges from the plane
-};
 
 /// A beam's direction and its two tangents, sensor frame.
 struct BeamFrame {
@@ -39,6 +33,20 @@ struct WindowFiring {
     };
     Linear time;       ///< columns
     Linear origin[3];  ///< metres; component of the beam's origin along BeamFrame's direction, along_row and up
+};
+
+/// The planes around every column_step-th pixel of one row. A window with a pixel without return, or with pixels a turn
+/// apart in time (the seam), or of which too little came, has inverse range 0.
+struct PlaneRow {
+    AlignedVector<float> inverse_range;   ///< [W / column_step] smoothed, 1/m, from the beam's origin
+    AlignedVector<float> slope_azimuth;   ///< derivative of the inverse range along the row, towards growing columns
+    AlignedVector<float> slope_altitude;  ///< the same upwards
+    AlignedVector<float> deviation_m;     ///< root mean square deviation of the ranges from the plane, of 25 pixels
+    struct Partial {
+        int window;
+        WindowFiring firing;
+    };
+    std::vector<Partial> partial;  ///< windows with pixels of missing columns, ascending
 };
 
 class PlaneWindows {
@@ -57,7 +65,7 @@ class PlaneWindows {
     }
     /// @param measurement column in which the pixel was fired
     BeamFrame beam(int row, int measurement) const;
-    /// Of all windows whose centre lies in `row`.
+    /// Of all whole windows whose centre lies in `row`.
     const WindowFiring& firing(int row) const { return model_[static_cast<std::size_t>(row)].firing; }
 
   private:
@@ -67,6 +75,8 @@ class PlaneWindows {
         float scale[kWindowPixels];  ///< 1 / (u . d): inverse range to inverse depth along the centre beam
         float azimuth[kWindowPixels];
         float altitude[kWindowPixels];
+        float fired[kWindowPixels][4];  ///< when [columns], and from where [m], as in WindowFiring
+        double slope_variance[2];       ///< of a whole window, per variance of an inverse depth
         WindowFiring firing;
         int first_row = 0;  ///< topmost row of the window; clamped at the image's edge
         float cos_altitude = 1.0F;
@@ -74,6 +84,10 @@ class PlaneWindows {
         float cos_offset = 1.0F;  ///< of the row's azimuth offset
         float sin_offset = 0.0F;
     };
+
+    /// First value of each pixel of a row's windows.
+    void find_pixels(int row, const float* (&pixels)[kWindowPixels]) const;
+    void fit_partial(int row, int window, const float* const* pixels, PlaneRow& planes) const;
 
     float* part_of(int row, int part) {
         return inverse_.data() + (static_cast<std::size_t>(row) * static_cast<std::size_t>(column_step_) +
@@ -86,11 +100,12 @@ class PlaneWindows {
     std::vector<RowModel> model_;  ///< by row
     int column_step_;
     int windows_;
-    /// Inverse ranges, wrapped around the image's edge. A row holds column_step parts of stride_ values: part p is
-    /// columns p, p + column_step, ..., after one that lies before the image, so that windows of a row are read without
-    /// gaps.
+    /// Inverse ranges, wrapped around the image's edge; 0 without return, kMissing of a missing column. A row holds
+    /// column_step parts of stride_ values: part p is columns p, p + column_step, ..., after one that lies before the
+    /// image, so that windows of a row are read without gaps.
     AlignedVector<float> inverse_;
     std::size_t stride_;
+    std::vector<int> missing_;                        ///< measurement ids of the frame's missing columns
     std::vector<float> row_;                          ///< scratch: inverse ranges of a row in their order
     std::vector<std::vector<std::uint8_t>> usable_;   ///< by row and window: 1 where it does not straddle the seam
     AlignedVector<float> cos_azimuth_, sin_azimuth_;  ///< by measurement: encoder angle

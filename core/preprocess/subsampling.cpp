@@ -46,10 +46,13 @@ int fair_share(const std::array<int, N>& counts, int budget) {
 }  // namespace
 
 Subsampling::Subsampling(const SensorModel& sensor, const SubsamplingConfig& config)
-    : sensor_(sensor), config_(scaled(config, sensor.width)), windows_(sensor, config_.column_step) {
-    const int rows = std::clamp(config.rows, 1, sensor.height);
-    for (int i = 0; i < rows; ++i) candidate_rows_.push_back((2 * i + 1) * sensor.height / (2 * rows));
-    const auto most = static_cast<std::size_t>(rows) * static_cast<std::size_t>(windows_.windows());
+    : sensor_(sensor),
+      config_(scaled(config, sensor.width)),
+      windows_(sensor, config_.column_step),
+      rows_(std::clamp(config.rows, 1, sensor.height)) {
+    const int after_first = sensor.column_window_last - sensor.column_window_first;
+    sent_columns_ = (after_first + sensor.width) % sensor.width + 1;
+    const auto most = static_cast<std::size_t>(rows_) * static_cast<std::size_t>(windows_.windows());
     flat_.reserve(most);
     rough_.reserve(most);
     order_.reserve(most);
@@ -60,8 +63,16 @@ void Subsampling::process(Frame& frame) {
     flat_.clear();
     rough_.clear();
     windows_.load(frame);
-    for (const int row : candidate_rows_) collect_row(frame, row);
+    const int rows = rows_of(frame);
+    for (int i = 0; i < rows; ++i) collect_row(frame, (2 * i + 1) * sensor_.height / (2 * rows));
     select(frame);
+}
+
+/// Rows with candidates: so many that there are as many candidates as in a whole frame. With beams of different
+/// azimuths other rows have lost other columns.
+int Subsampling::rows_of(const Frame& frame) const {
+    const int came = std::clamp(frame.header.valid_columns, 1, sent_columns_);
+    return std::min(rows_ * sent_columns_ / came, sensor_.height);
 }
 
 void Subsampling::collect_row(const Frame& frame, int row) {
@@ -74,8 +85,9 @@ void Subsampling::collect_row(const Frame& frame, int row) {
     // Columns per spacing at one metre of range.
     const auto columns_at_1m = static_cast<float>(config_.spacing_m * w / (2.0 * std::numbers::pi));
     const auto column_s = static_cast<float>(sensor_.frame_period_s / w);
-    const WindowFiring& firing = windows_.firing(row);
-    const int delay = static_cast<int>(std::lround(firing.time.centre));
+    const WindowFiring& whole = windows_.firing(row);
+    const int whole_delay = static_cast<int>(std::lround(whole.time.centre));
+    auto partial = planes_.partial.cbegin();
     const float* range = frame.cloud.range_m.row(row);
     const std::uint32_t* raw = frame.raw.range_mm.row(row);
     const float* x = frame.cloud.x.row(row);
@@ -100,6 +112,10 @@ void Subsampling::collect_row(const Frame& frame, int row) {
             const float g = planes_.slope_altitude[i];
             const float length = std::sqrt(inverse * inverse + b * b + g * g);
             if (inverse >= min_incidence * length) {
+                while (partial != planes_.partial.cend() && partial->window < k) ++partial;
+                const bool is_partial = partial != planes_.partial.cend() && partial->window == k;
+                const WindowFiring& firing = is_partial ? partial->firing : whole;
+                const int delay = is_partial ? static_cast<int>(std::lround(firing.time.centre)) : whole_delay;
                 const BeamFrame beam = windows_.beam(row, measurement);
                 // The normal in the axes of the beam, as if all pixels had one origin, and what their origins add.
                 const float n[3] = {-inverse / length, -b / length, -g / length};

@@ -23,7 +23,8 @@ struct SubsamplingConfig {
     template <class V>
     void visit(V& v) {
         v.parameter("rows", rows, Range{4, 512}, "rows",
-                    "rows of the image that are candidates; more is slower, more accurate");
+                    "rows of the image that are candidates; more is slower, more accurate; where columns are missing "
+                    "more rows make up for them");
         v.parameter("column_step", column_step, Range{1, 64}, "columns",
                     "every n-th of 1024 columns is a candidate; finer images have no more of them");
         v.parameter("rough_step", rough_step, Range{1, 16}, "candidates",
@@ -74,6 +75,7 @@ class Subsampling {
         std::uint16_t place() const { return fired; }
     };
 
+    int rows_of(const Frame& frame) const;
     void collect_row(const Frame& frame, int row);
     void thin_out();
     void select(Frame& frame);
@@ -86,7 +88,8 @@ class Subsampling {
     PlaneRow planes_;
     std::vector<Flat> flat_;
     std::vector<Rough> rough_;
-    std::vector<int> candidate_rows_;
+    int rows_;                          ///< with candidates, of a whole frame
+    int sent_columns_;                  ///< that a whole frame has
     std::vector<std::uint32_t> order_;  ///< scratch of sort_by_firing
     std::vector<std::uint32_t> next_;   ///< scratch of sort_by_firing
 };

@@ -65,8 +65,13 @@ void ScanToScan::match(const PointSelection& points, std::span<const std::uint8_
     const auto kernel = kKernel_m * static_cast<float>(widening);
     const auto min_cosine = static_cast<float>(config_.min_normal_cosine);
     const Eigen::Matrix3f R_local_target = T_target_local.linear().transpose();
-    const std::size_t step = std::max<std::size_t>(1, excluded.size() / static_cast<std::size_t>(config_.points));
-    for (std::size_t i = 0; i < excluded.size(); i += step) {
+    // Flat points come first; the raw ones that make up for them have no normal to compare.
+    std::size_t count = excluded.size();
+    while (count > 0 && points.nx[count - 1] == 0.0F && points.ny[count - 1] == 0.0F && points.nz[count - 1] == 0.0F) {
+        --count;
+    }
+    const std::size_t step = std::max<std::size_t>(1, count / static_cast<std::size_t>(config_.points));
+    for (std::size_t i = 0; i < count; i += step) {
         if (points.planarity[i] <= 0.0F || excluded[i]) continue;
         const Eigen::Vector3f p = T_target_local * Eigen::Vector3f(placed.x[i], placed.y[i], placed.z[i]);
         const int cell = cell_of(p.data());

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -22,6 +23,11 @@ SensorModel staggered_sensor(int height, int width, float beam_origin_m = 0.0F) 
                              .sensor();
     sensor.beam_origin_m = beam_origin_m;
     return sensor;
+}
+
+void receive_all_columns(Frame& frame) {
+    std::fill(frame.columns.valid.begin(), frame.columns.valid.end(), std::uint8_t{1});
+    frame.header.valid_columns = static_cast<int>(frame.columns.valid.size());
 }
 
 struct Beam {
@@ -44,6 +50,7 @@ Beam beam_of(const SensorModel& sensor, int row, int column) {
 /// Ranges to the plane normal . p = offset, with noise; 0 where the beam does not meet it within 60 m.
 void shoot_at_plane(const SensorModel& sensor, const Eigen::Vector3d& normal, double offset, double noise_m,
                     Frame& frame) {
+    receive_all_columns(frame);
     std::mt19937_64 random(7);
     std::normal_distribution<double> gauss;
     for (int r = 0; r < sensor.height; ++r) {
@@ -231,6 +238,7 @@ TEST(PlaneWindows, StepLeavesOutWindowsAndChangesNone) {
 TEST(PlaneWindows, AWindowWithAHoleIsNone) {
     const SensorModel sensor = staggered_sensor(16, 512);
     Frame frame(sensor);
+    receive_all_columns(frame);
     frame.raw.range_mm.fill(5000);
     frame.raw.range_mm(8, 100) = 0;
     PlaneWindows windows(sensor, 1);
@@ -245,9 +253,135 @@ TEST(PlaneWindows, AWindowWithAHoleIsNone) {
     }
 }
 
+/// Loses packets of 16 columns at random.
+void lose_packets(const SensorModel& sensor, double share, Frame& frame) {
+    std::mt19937_64 random(11);
+    std::uniform_real_distribution<double> uniform;
+    frame.header.valid_columns = 0;
+    for (int m = 0; m < sensor.width; m += 16) {
+        const bool comes = uniform(random) >= share;
+        for (int i = m; i < m + 16; ++i) frame.columns.valid[static_cast<std::size_t>(i)] = comes ? 1 : 0;
+        frame.header.valid_columns += comes ? 16 : 0;
+    }
+    for (int r = 0; r < sensor.height; ++r) {
+        for (int c = 0; c < sensor.width; ++c) {
+            const auto m = static_cast<std::size_t>(sensor.measurement_of(r, c));
+            if (!frame.columns.valid[m]) frame.raw.range_mm(r, c) = 0;
+        }
+    }
+}
+
+TEST(PlaneWindows, OfWhichColumnsAreMissingAreFittedToTheRest) {
+    const SensorModel sensor = staggered_sensor(64, 1024);
+    const Eigen::Vector3d normal = Eigen::Vector3d(1, 0.3, 0.1).normalized();
+    constexpr double kOffset_m = 6.0;
+    constexpr double kNoise_m = 0.01;
+    Frame frame(sensor);
+    shoot_at_plane(sensor, normal, kOffset_m, kNoise_m, frame);
+    PlaneWindows windows(sensor, 4);
+    const auto count_whole = [&](const PlaneRow& planes) {
+        return std::count_if(planes.inverse_range.begin(), planes.inverse_range.begin() + windows.windows(),
+                             [](float inverse) { return inverse > 0.0F; });
+    };
+    PlaneRow planes;
+    long all = 0;
+    windows.load(frame);
+    for (int row = 0; row < sensor.height; ++row) {
+        windows.fit_row(row, planes);
+        all += count_whole(planes);
+        EXPECT_TRUE(planes.partial.empty());
+    }
+    lose_packets(sensor, 0.6, frame);
+    windows.load(frame);
+    int partial = 0;
+    double angle2 = 0.0, range2 = 0.0, deviation2 = 0.0;
+    for (int row = 0; row < sensor.height; ++row) {
+        windows.fit_row(row, planes);
+        for (const PlaneRow::Partial& window : planes.partial) {
+            const auto i = static_cast<std::size_t>(window.window);
+            const Beam beam = beam_of(sensor, row, window.window * 4);
+            const double along = normal.dot(beam.direction);
+            if (along < 0.3) continue;
+            ASSERT_GT(frame.raw.range_mm(row, window.window * 4), 0U);
+            angle2 += std::pow(angle_deg(normal_of(sensor, windows, planes, row, window.window, 4), -normal), 2);
+            range2 += std::pow(1.0 / static_cast<double>(planes.inverse_range[i]) - kOffset_m / along, 2);
+            deviation2 += std::pow(static_cast<double>(planes.deviation_m[i]), 2);
+            ++partial;
+        }
+    }
+    // Of the two fifths of the windows whose centre came more than every third, where next to none is whole.
+    ASSERT_GT(partial, 0.4 * static_cast<double>(all) / 3.0);
+    // Nine times the variance of a whole window at most: of these the angle is off by some 2 degrees.
+    EXPECT_LT(std::sqrt(angle2 / partial), 5.0);
+    EXPECT_LT(std::sqrt(range2 / partial), kNoise_m);
+    // As measured over 25 pixels of which three are spent on the fit.
+    EXPECT_NEAR(std::sqrt(deviation2 / partial), kNoise_m * std::sqrt(22.0 / 25.0), 0.1 * kNoise_m);
+}
+
+// Two rows lie on a plane whatever they show, three do not.
+TEST(PlaneWindows, OfLessThanThreeRowsOrColumnsAreNone) {
+    SensorModel sensor = staggered_sensor(16, 512);
+    for (const int rows : {2, 3}) {
+        // The beams of the middle rows point elsewhere: they were fired when other packets came.
+        for (int r = 0; r < sensor.height; ++r) {
+            const bool middle = r >= 7 && r < 7 + rows;
+            sensor.pixel_shift[static_cast<std::size_t>(r)] = middle ? 32 : 0;
+            sensor.azimuth_offset_rad[static_cast<std::size_t>(r)] =
+                static_cast<float>((middle ? 32 : 0) * 2.0 * std::numbers::pi / sensor.width);
+        }
+        Frame frame(sensor);
+        shoot_at_plane(sensor, -Eigen::Vector3d::UnitX(), 5.0, 0.0, frame);
+        frame.header.valid_columns = sensor.width - 64;
+        for (int m = 0; m < sensor.width; ++m) {
+            frame.columns.valid[static_cast<std::size_t>(m)] = m >= 32 && m < 96 ? 0 : 1;
+        }
+        for (int r = 0; r < sensor.height; ++r) {
+            for (int c = 0; c < sensor.width; ++c) {
+                const auto m = static_cast<std::size_t>(sensor.measurement_of(r, c));
+                if (!frame.columns.valid[m]) frame.raw.range_mm(r, c) = 0;
+            }
+        }
+        PlaneWindows windows(sensor, 1);
+        windows.load(frame);
+        PlaneRow planes;
+        windows.fit_row(8, planes);
+        // Columns 32 to 63: the middle rows came, the others did not. Near 64 everything is missing.
+        int fitted = 0;
+        for (int c = 36; c < 60; ++c) {
+            ASSERT_GT(frame.raw.range_mm(8, c), 0U);
+            fitted += planes.inverse_range[static_cast<std::size_t>(c)] > 0.0F ? 1 : 0;
+        }
+        EXPECT_EQ(fitted, rows == 3 ? 24 : 0);
+        // The last column before the gap has two neighbours, the first one behind it likewise.
+        windows.fit_row(2, planes);
+        for (const int c : {31, 96}) EXPECT_GT(planes.inverse_range[static_cast<std::size_t>(c)], 0.0F) << c;
+    }
+}
+
+// What sent no echo is no part of a surface, whether columns are missing beside it or not.
+TEST(PlaneWindows, WithAPixelWithoutReturnAreNoneWhereColumnsAreMissingEither) {
+    const SensorModel sensor = staggered_sensor(16, 512);
+    Frame frame(sensor);
+    receive_all_columns(frame);
+    frame.raw.range_mm.fill(5000);
+    lose_packets(sensor, 0.3, frame);
+    PlaneWindows windows(sensor, 1);
+    PlaneRow planes;
+    windows.load(frame);
+    windows.fit_row(8, planes);
+    ASSERT_FALSE(planes.partial.empty());
+    const int c = planes.partial[planes.partial.size() / 2].window;
+    // The centre's row came there.
+    frame.raw.range_mm(8, c + 1) = 0;
+    windows.load(frame);
+    windows.fit_row(8, planes);
+    EXPECT_EQ(planes.inverse_range[static_cast<std::size_t>(c)], 0.0F);
+}
+
 TEST(PlaneWindows, NoneLiesAcrossTheSeamBetweenTheLastColumnFiredAndTheFirst) {
     const SensorModel sensor = staggered_sensor(32, 512);
     Frame frame(sensor);
+    receive_all_columns(frame);
     frame.raw.range_mm.fill(5000);
     PlaneWindows windows(sensor, 1);
     windows.load(frame);
@@ -273,6 +407,7 @@ TEST(PlaneWindows, NoneLiesAcrossTheSeamBetweenTheLastColumnFiredAndTheFirst) {
 TEST(PlaneWindows, ImagesWithFewerRowsThanAWindowHaveNone) {
     const SensorModel sensor = staggered_sensor(4, 512);
     Frame frame(sensor);
+    receive_all_columns(frame);
     frame.raw.range_mm.fill(5000);
     PlaneWindows windows(sensor, 1);
     windows.load(frame);

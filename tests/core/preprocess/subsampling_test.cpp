@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -287,6 +288,34 @@ TEST(Subsampling, RawPointsTakePartOnlyWhereFlatOnesAreFew) {
     }
     config.least_points = static_cast<int>(flat) + 100;
     EXPECT_EQ(taking_part(), 100);
+}
+
+TEST(Subsampling, WherePacketsAreLostOtherRowsAndPartsOfWindowsMakeUpForThem) {
+    Room whole(resolution(128, 1024));
+    const PointSelection& all = whole.select(SubsamplingConfig{});
+    Room torn(resolution(128, 1024));
+    torn.drive.column_arrives = [](int, int m) { return (m / 16 * 7) % 10 < 4; };
+    torn.drive.fill(1, torn.frame);
+    ASSERT_LT(torn.frame.header.valid_columns, 450);
+    const PointSelection& rest = torn.select(SubsamplingConfig{});
+    // By the axis of the normal, and its sign.
+    const auto flat = [](const PointSelection& points) {
+        std::array<int, 6> count{};
+        for (std::size_t i = 0; i < points.size(); ++i) {
+            if (normal(points, i).isZero()) continue;
+            Eigen::Index axis;
+            normal(points, i).cwiseAbs().maxCoeff(&axis);
+            ++count[static_cast<std::size_t>(2 * axis + (normal(points, i)[axis] > 0.0F ? 1 : 0))];
+        }
+        return count;
+    };
+    const auto before = flat(all), after = flat(rest);
+    for (std::size_t side = 0; side < 6; ++side) EXPECT_GT(after[side], before[side] / 4) << side;
+    EXPECT_LE(rest.size(), 32U * 256U);
+    for (std::size_t i = 0; i < rest.size(); ++i) {
+        ASSERT_TRUE(torn.frame.columns.valid[rest.measurement[i]]);
+        ASSERT_TRUE(std::isfinite(rest.x[i] + rest.nx[i] + rest.planarity[i] + rest.time_s[i] + rest.tx[i]));
+    }
 }
 
 TEST(Subsampling, AFrameWithoutReturnsGivesNoPoints) {

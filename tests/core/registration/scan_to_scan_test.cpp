@@ -63,6 +63,21 @@ class ScanToScanTest : public testing::Test {
     ScanToScan registration{ScanToScanConfig{}};
 };
 
+TEST_F(ScanToScanTest, RawPointsThatMakeUpForFlatOnesTakeNoneOfTheirPlaces) {
+    set_target(registration, target);
+    const std::size_t matched = match(scan).count;
+    ASSERT_GT(matched, 100U);
+    // All those without a normal, which come last, take part now.
+    std::size_t raw = 0;
+    for (std::size_t i = 0; i < scan.points.size(); ++i) {
+        if (scan.points.nx[i] != 0.0F || scan.points.ny[i] != 0.0F || scan.points.nz[i] != 0.0F) continue;
+        scan.points.planarity[i] = 0.1F;
+        ++raw;
+    }
+    ASSERT_GT(raw, matched);
+    EXPECT_EQ(match(scan).count, matched);
+}
+
 TEST_F(ScanToScanTest, HasNoTargetBeforeTheFirstScanAndAfterItIsCleared) {
     EXPECT_FALSE(registration.has_target());
     set_target(registration, target);
