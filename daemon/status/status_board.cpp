@@ -178,7 +178,8 @@ void StatusBoard::compose_health(std::int64_t last_packet_ns, std::int64_t now_n
         status_.health_text = fmt::format(
             "no packets for {} s: {}", packet_age_ns / kSecond,
             sensor_trouble_.empty() ? "check the sensor's power, cable and UDP destination" : sensor_trouble_);
-    } else if (now_ns - std::max(pose_ns, packets_since_ns_) > kSilence) {
+    } else if (last_packet_ns - std::max(pose_ns, packets_since_ns_) > kSilence) {
+        // Up to the last packet: while a sensor that was unplugged is not yet silent for long, nothing is lost.
         status_.health = status_t::FAULT;
         status_.health_text = "packets arrive but no valid pose: " + (losses.empty() ? "the odometry is lost" : losses);
     } else {

@@ -101,6 +101,15 @@ TEST_F(StatusBoardTest, PacketsThatHaveOnlyJustComeMayBeWithoutAPose) {
     EXPECT_EQ(at(74.0, {}, 74.0).health, status_t::FAULT) << "packets, but no pose for three seconds";
 }
 
+TEST_F(StatusBoardTest, AnUnpluggedSensorIsNoLostOdometry) {
+    at(60.0, {}, 60.0);
+    pose_at(69.9);
+    EXPECT_EQ(at(70.0, {}, 70.0).health, status_t::OK) << board_.one_line();
+    // The last pose is older than the last packet by what a frame takes.
+    for (const double now_s : {71.0, 71.95, 72.0}) EXPECT_EQ(at(now_s, {}, 70.0).health, status_t::OK) << now_s;
+    EXPECT_EQ(at(72.05, {}, 70.0).health, status_t::WAITING) << board_.one_line();
+}
+
 TEST_F(StatusBoardTest, AnAnswerGoesOutAtOnceAndStays) {
     pose_at(2.0);
     EXPECT_EQ(at(2.0, {{"frames", 10}}, 2.0).command_id, 0) << "none yet";
