@@ -51,7 +51,10 @@ std::string request(const std::string& host, std::chrono::milliseconds timeout, 
                           " (is the sensor powered and connected, and sensor.host right?)");
     }
     if (result->status != 200) {
-        throw SensorError(what + ": status " + std::to_string(result->status) + " " + driver::printable(answer));
+        // A page for people says no more than its title.
+        const bool is_page = answer.starts_with('<');
+        throw SensorError(what + ": status " + std::to_string(result->status) + " " +
+                          driver::printable(is_page ? result->reason : answer));
     }
     return answer;
 }

@@ -88,6 +88,10 @@ TEST(SensorClient, ErrorsNameHostRequestAndAnswer) {
          {sensor.host(), std::string("/api/v1/sensor/metadata"), std::string("503"), std::string("booting")}) {
         EXPECT_NE(error.find(part), std::string::npos) << part << " in: " << error;
     }
+    sensor.metadata = "<!DOCTYPE HTML><html><head><title>Error response</title></head></html>";
+    const std::string page = error_of(SensorClient(sensor.host()));
+    EXPECT_NE(page.find("503"), std::string::npos) << page;
+    EXPECT_EQ(page.find('<'), std::string::npos) << page;
 }
 
 TEST(SensorClient, WhatIsNoOusterIsSaidSo) {
