@@ -16,6 +16,9 @@ namespace dlod {
 /// back it begins anew.
 class ImuBuffer {
   public:
+    /// What its clock and the lidar's may differ by.
+    static constexpr double kClockOffset_s = 1e-3;
+
     struct Reading {
         Eigen::Vector3d angular_velocity_radps = Eigen::Vector3d::Zero();
         Eigen::Vector3d acceleration_mps2 = Eigen::Vector3d::Zero();

@@ -36,6 +36,11 @@ bool same(const ImuSample& a, const ImuSample& b) {
     return a.acceleration_mps2 == b.acceleration_mps2 && a.angular_velocity_radps == b.angular_velocity_radps;
 }
 
+/// 1: at the bound of what is possible.
+double share_of_possible(double correction, double impossible, double deviations, double deviation) {
+    return std::min(correction / impossible, correction / (deviations * deviation));
+}
+
 }  // namespace
 
 void ImuMonitor::fail() {
@@ -92,19 +97,18 @@ void ImuMonitor::see_rest(std::span<const ImuSample> samples) {
     rest_force_mps2_ += (force - rest_force_mps2_) / static_cast<float>(quiet_frames_);
 }
 
+bool ImuMonitor::is_impossible_position(const Correction& c) {
+    return share_of_possible(c.position_m, kImpossiblePosition_m, kPositionDeviations, c.position_deviation_m) > 1.0;
+}
+
 bool ImuMonitor::see_correction(const Correction& c) {
-    // 1: at the bound of what is possible.
-    const auto share = [](double correction, double impossible, double deviations, double deviation) {
-        return std::min(correction / impossible, correction / (deviations * deviation));
-    };
-    const double position = share(c.position_m, kImpossiblePosition_m, kPositionDeviations, c.position_deviation_m);
     const double rotation =
-        share(c.rotation_rad, kImpossibleRotation_rad, kImpossibleDeviations, c.rotation_deviation_rad);
+        share_of_possible(c.rotation_rad, kImpossibleRotation_rad, kImpossibleDeviations, c.rotation_deviation_rad);
     const double velocity =
-        share(c.velocity_mps, kImpossibleVelocity_mps, kImpossibleDeviations, c.velocity_deviation_mps);
+        share_of_possible(c.velocity_mps, kImpossibleVelocity_mps, kImpossibleDeviations, c.velocity_deviation_mps);
     const double worst = std::max(rotation, velocity);
     disagreement_ = kDisagreementDecay * disagreement_ + (worst > kSuspiciousShare ? worst : 0.0);
-    if (std::max(worst, position) <= 1.0 && disagreement_ <= kDisagreementLimit) return true;
+    if (worst <= 1.0 && !is_impossible_position(c) && disagreement_ <= kDisagreementLimit) return true;
     fail();
     return false;
 }

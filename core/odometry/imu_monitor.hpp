@@ -24,6 +24,8 @@ class ImuMonitor {
         double rotation_rad = 0.0, rotation_deviation_rad = 1.0;
         double velocity_mps = 0.0, velocity_deviation_mps = 1.0;
     };
+    /// The position alone is beyond belief.
+    static bool is_impossible_position(const Correction& correction);
     /// @return false: this is beyond belief, the IMU is faulty from now on
     bool see_correction(const Correction& correction);
     /// While the IMU is not in use: how far its turn over a frame is from the lidar's, and its mean force from what the

@@ -45,6 +45,7 @@ void MotionFilter::initialize(const Eigen::Isometry3d& T_world_sensor, const Eig
     state_.position_m = T_world_body.translation();
     state_.gravity_mps2 = gravity_mps2;
     stamp_ns_ = stamp_ns;
+    start_ns_ = stamp_ns;
     forget(kPosition, kKnownPose);
     forget(kRotation, kKnownPose);
     forget(kVelocity, kUnknownVelocity_mps);
@@ -356,6 +357,10 @@ Matrix6d MotionFilter::pose_covariance() const {
     Matrix6d J = Matrix6d::Identity();
     J.block<3, 3>(0, 3) = -skew(state_.rotation * T_body_sensor_.translation());
     return J * covariance_.block<6, 6>(0, 0) * J.transpose();
+}
+
+double MotionFilter::position_deviation_m() const {
+    return std::sqrt(pose_covariance().diagonal().head<3>().sum());
 }
 
 }  // namespace dlod

@@ -118,7 +118,10 @@ class MotionFilter {
     /// being quite what the state says.
     Matrix6d sweep_noise(double duration_s) const;
     const Matrix& covariance() const { return covariance_; }
+    double position_deviation_m() const;  ///< of the sensor
     std::int64_t stamp_ns() const { return stamp_ns_; }
+    /// Time since it was initialized.
+    double age_s() const { return static_cast<double>(stamp_ns_ - start_ns_) * 1e-9; }
 
   private:
     static Eigen::Vector3d lasting(const MotionState& s, const Eigen::Vector3d& rate_radps);
@@ -144,6 +147,7 @@ class MotionFilter {
     double acceleration2_ = 0.0;
     double angular_acceleration2_ = 0.0;
     double silent_s_ = 0.0;  ///< so long the IMU has said nothing, at the present stamp
+    std::int64_t start_ns_ = 0;
     std::int64_t updated_ns_ = 0;
     std::int64_t stamp_ns_ = 0;
 };

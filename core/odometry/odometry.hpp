@@ -1,57 +1,87 @@
 // Two-stage odometry (paper, Sec. "Overview", Eq. 4): scan to scan, then scan to submap with the first as prior.
 #pragma once
 
-#include <memory>
+#include <cstdint>
+#include <optional>
 
 #include "core/map/keyframe_database.hpp"
+#include "core/odometry/bootstrap.hpp"
 #include "core/odometry/feedback.hpp"
+#include "core/odometry/frame_registration.hpp"
+#include "core/odometry/imu_use.hpp"
+#include "core/odometry/levelling.hpp"
 #include "core/odometry/motion_filter.hpp"
-#include "core/registration/scan_to_scan.hpp"
-#include "core/registration/scan_to_submap.hpp"
+#include "core/odometry/moving_points.hpp"
+#include "core/odometry/odometry_config.hpp"
+#include "core/odometry/pose_uncertainty.hpp"
+#include "core/odometry/registered_motion.hpp"
+#include "core/odometry/relocalization.hpp"
+#include "core/odometry/spaciousness.hpp"
+#include "core/odometry/usual_quality.hpp"
 #include "core/types/frame.hpp"
-#include "core/types/parameter.hpp"
 
 namespace dlod {
-
-struct OdometryConfig {
-    bool use_imu = true;
-    double max_deviation_m = 0.3;
-    double surface_error_m = 0.002;
-    ScanToScanConfig scan_to_scan;
-    ScanToSubmapConfig scan_to_submap;
-    MotionFilterConfig motion;
-    VoxelMapConfig voxels;
-    KeyframeConfig keyframes;
-
-    template <class V>
-    void visit(V& v) {
-        v.flag("use_imu", use_imu, "use the sensor's IMU for rotation, gravity and motion within the sweep");
-        v.parameter("max_deviation_m", max_deviation_m, Range{0.01, 100.0}, "m",
-                    "a pose is valid while its standard deviation against the local map stays below this in every "
-                    "direction; higher trusts predictions for longer, in tunnels and through gaps");
-        v.parameter("surface_error_m", surface_error_m, Range{0.0, 0.5}, "m",
-                    "error of the map that all points of a voxel's surface share; larger makes the covariance grow "
-                    "faster with the way");
-        v.group("scan_to_scan", scan_to_scan, "first stage of the registration");
-        v.group("scan_to_submap", scan_to_submap, "second stage of the registration");
-        v.group("motion", motion, "motion model and its noise");
-        v.group("voxels", voxels, "voxels of the local map");
-        v.group("keyframes", keyframes, "choice of keyframes and submap");
-    }
-};
 
 /// Estimates the pose of each frame in turn and keeps the local map. Fills frame.odometry.
 class Odometry {
   public:
     Odometry(const SensorModel& sensor, const OdometryConfig& config);
-    ~Odometry();
+    Odometry(const Odometry&) = delete;
+    Odometry& operator=(const Odometry&) = delete;
 
     /// @param feedback of the frame kFeedbackDelay before this one, or nullptr for the first frames
     void process(Frame& frame, const OdometryFeedback* feedback);
 
   private:
-    struct State;
-    std::unique_ptr<State> state_;
+    /// What becomes of one frame.
+    struct Course {
+        bool registered = false;
+        bool trusted = true;                       ///< false: what this frame gives is not to be used
+        bool begins_map = false;                   ///< the map begins with it
+        std::optional<std::int64_t> void_scan_ns;  ///< as in the result
+        std::uint32_t flags = 0;
+        MatchQuality quality;  ///< of the last registration
+    };
+
+    void apply(const OdometryFeedback& feedback);
+    void begin_world(const Frame& frame);
+    void follow(const Frame& frame);
+    void begin_map(const Frame& frame, const Eigen::Isometry3d& T_world_sensor, const Matrix6d& covariance);
+    void begin_map_here(const Frame& frame, const Matrix6d& moved);
+    void renew_map(const Frame& frame);
+    bool register_frame(const Frame& frame);
+    void accept();
+    void see_uncertainty();
+    bool doubts_imu() const;
+    void retry_without_imu(const Frame& frame, const MotionFilter& before, bool absurd);
+    bool find_again(const Frame& frame);
+    void level(const Frame& frame);
+    void begin_levelled_world(const Frame& frame);
+    void remember(const Frame& frame);
+    void write_result(Frame& frame);
+    void write_keyframe_points(Frame& frame) const;
+    void write_nothing(Frame& frame) const;
+    bool is_valid(const Matrix6d& deviation) const;
+
+    SensorModel sensor_;
+    OdometryConfig config_;
+    ImuUse imu_;
+    MotionFilter filter_;
+    FrameRegistration registration_;
+    KeyframeDatabase keyframes_;
+    MovingPoints moving_;
+    Bootstrap bootstrap_;
+    Levelling levelling_;
+    Relocalization relocalization_;
+    UsualQuality usual_;
+    RegisteredMotion registered_motion_;
+    PoseUncertainty uncertainty_;
+    Spaciousness spaciousness_;
+
+    bool started_ = false;
+    std::uint64_t world_sequence_ = 0;  ///< of the frame that the world began with
+    std::uint64_t map_sequence_ = 0;    ///< of the frame that the map began with
+    Course now_;
 };
 
 }  // namespace dlod
