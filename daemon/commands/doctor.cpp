@@ -46,6 +46,11 @@ ExitCode doctor(const ConfigSources& sources) {
                                     std::uint64_t{1'000'000} * static_cast<std::uint64_t>(config.recording.files) *
                                         static_cast<std::uint64_t>(config.recording.file_megabytes)));
     }
+    if (!config.saved_maps.folder.empty()) {
+        // One map, as PCD and PLY.
+        checks.push_back(check_disk(config.saved_maps.folder,
+                                    2 * sizeof(MapPoint) * static_cast<std::uint64_t>(config.method.map.max_points)));
+    }
     for (const Check& check : checks) {
         std::printf("%-8s %s: %s\n", word_for(check.verdict), check.name.c_str(), check.finding.c_str());
         if (!check.remedy.empty()) std::printf("         -> %s\n", check.remedy.c_str());

@@ -92,6 +92,10 @@ TEST_F(CommandsTest, DoctorNamesRemedies) {
     const auto outcome = dlod({"doctor", "--set", "sensor.receive_buffer_bytes=1000000000", "--set", "lcm.url=none"});
     EXPECT_TRUE(outcome.exit_code == 0 || outcome.exit_code == 1) << outcome.exit_code;
     EXPECT_TRUE(ends(outcome, outcome.exit_code, {"receive buffer", "net.core.rmem_max=1000000000", "clock"}));
+    for (const char* folder : {"recording.folder", "saved_maps.folder", "output.folder"}) {
+        const auto unusable = dlod({"doctor", "--set", "lcm.url=none", "--set", std::string(folder) + "=" + capture_});
+        EXPECT_TRUE(ends(unusable, 1, {"is no folder"})) << folder;
+    }
 }
 
 TEST_F(CommandsTest, Info) {
