@@ -27,6 +27,7 @@ Eigen::Matrix3d levelled(const Eigen::Vector3d& up) {
 }
 
 void Levelling::begin_map() {
+    scans_ = 0;
     start_level_.clear();
 }
 

@@ -36,7 +36,6 @@ class Levelling {
     bool known() const { return known_; }
     /// The map begins with this scan.
     void begin_map();
-    void see_first_scan() { scans_ = 0; }
     /// Another scan has been registered while the level was not known.
     /// @param degenerate a direction is held: it follows the accelerometer, and says nothing of it
     Next see_scan(const MotionFilter& filter, const ImuBuffer& imu, bool degenerate);

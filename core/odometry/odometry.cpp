@@ -258,7 +258,6 @@ void Odometry::level(const Frame& frame) {
         levelling_.give_up();
         return;
     }
-    if (now_.begins_map) levelling_.see_first_scan();
     if (now_.begins_map || !now_.registered) return;
     switch (levelling_.see_scan(filter_, imu_.samples(), registration_.is_degenerate())) {
         case Levelling::Next::kWait:
