@@ -102,15 +102,13 @@ Endpoint from_socket_address(const sockaddr_storage& storage) {
     return endpoint;
 }
 
-std::optional<IpAddress> source_address_for(const Endpoint& target) {
-    const int family = is_ipv4(target.address) ? AF_INET : AF_INET6;
-    const int fd = ::socket(family, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+std::optional<IpAddress> source_address_for(const SocketAddress& target) {
+    const int fd = ::socket(target.storage.ss_family, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     if (fd < 0) return std::nullopt;
-    const SocketAddress there = to_socket_address(target, family);
     sockaddr_storage here{};
     socklen_t length = sizeof here;
     // The kernel only looks up the route.
-    const bool routed = ::connect(fd, there.get(), there.length) == 0 &&
+    const bool routed = ::connect(fd, target.get(), target.length) == 0 &&
                         ::getsockname(fd, reinterpret_cast<sockaddr*>(&here), &length) == 0;
     const int reason = errno;
     ::close(fd);

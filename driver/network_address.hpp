@@ -48,6 +48,6 @@ Endpoint from_socket_address(const sockaddr_storage& storage);
 
 /// The address of this host from which datagrams to `target` leave; nothing, and errno, where no route leads there.
 /// Nothing is sent.
-std::optional<IpAddress> source_address_for(const Endpoint& target);
+std::optional<IpAddress> source_address_for(const SocketAddress& target);
 
 }  // namespace dlod::driver

@@ -87,7 +87,7 @@ Check check_multicast(const std::string& lcm_url) {
         return {check.name, Verdict::kWarning, "'" + lcm_url + "' is no multicast URL: nothing to check",
                 "lcm.url: udpm://239.255.76.67:7667?ttl=1"};
     }
-    const auto local = driver::source_address_for(group->endpoint);
+    const auto local = source_address_for(*group);
     if (!local) {
         return {check.name, Verdict::kFailure,
                 "no route to " + driver::to_string(group->endpoint.address) + ": " + std::strerror(errno),

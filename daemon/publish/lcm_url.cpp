@@ -1,5 +1,7 @@
 #include "daemon/publish/lcm_url.hpp"
 
+#include <sys/socket.h>
+
 #include <algorithm>
 #include <array>
 #include <cstdlib>
@@ -36,9 +38,13 @@ std::optional<LcmGroup> multicast_group_of(const std::string& url) {
     return LcmGroup{*endpoint, match[2].matched ? std::stoi(match[2].str()) : 0};
 }
 
+std::optional<driver::IpAddress> source_address_for(const LcmGroup& group) {
+    return driver::source_address_for(driver::to_socket_address(group.endpoint, AF_INET));
+}
+
 bool has_route(const std::string& url) {
     const auto group = multicast_group_of(url_or_default(url));
-    return !group || driver::source_address_for(group->endpoint).has_value();
+    return !group || source_address_for(*group).has_value();
 }
 
 }  // namespace dlod::daemon

@@ -23,6 +23,9 @@ struct LcmGroup {
 /// @return nothing where the URL is another provider's, or its address is no multicast address
 std::optional<LcmGroup> multicast_group_of(const std::string& url);
 
+/// The address of this host by which messages to the group leave; nothing, and errno, where no route leads there.
+std::optional<driver::IpAddress> source_address_for(const LcmGroup& group);
+
 /// False where the URL means a multicast group to which no route leads; errno tells why. LCM would print a page about
 /// it at every attempt to open it.
 bool has_route(const std::string& url);

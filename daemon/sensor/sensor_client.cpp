@@ -3,8 +3,8 @@
 #include <httplib.h>
 #include <netdb.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
+#include <cstring>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -139,15 +139,11 @@ std::string SensorClient::own_address() const {
     addrinfo* first = nullptr;
     if (::getaddrinfo(name.c_str(), "80", &hints, &first) != 0) return "";
     const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> found(first, &::freeaddrinfo);
-    const int fd = ::socket(found->ai_family, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    if (fd < 0) return "";
-    // Nothing is sent: the kernel only looks up the route.
-    sockaddr_storage local{};
-    socklen_t length = sizeof local;
-    const bool routed = ::connect(fd, found->ai_addr, found->ai_addrlen) == 0 &&
-                        ::getsockname(fd, reinterpret_cast<sockaddr*>(&local), &length) == 0;
-    ::close(fd);
-    return routed ? driver::to_string(driver::from_socket_address(local).address) : "";
+    driver::SocketAddress sensor;
+    std::memcpy(&sensor.storage, found->ai_addr, found->ai_addrlen);
+    sensor.length = found->ai_addrlen;
+    const auto own = driver::source_address_for(sensor);
+    return own ? driver::to_string(*own) : "";
 }
 
 void SensorClient::apply(const SensorSettings& settings) const {
