@@ -114,7 +114,7 @@ void Completion::complete(const Frame& frame, const EvidenceImage& evidence, std
                           std::vector<PixelIndex>& pixels) {
     if (config_.fringe_m > 0.0) {
         grow(frame, first, config_.fringe_m, pixels, [&](PixelIndex q) {
-            if (frame.prepared.ground[q] != 0 || evidence[q] == Evidence::kOccupied) return false;
+            if (frame.prepared.ground[q] != 0 || evidence.was_occupied(q)) return false;
             const std::uint32_t segment = frame.prepared.segment[q];
             if (segment == 0 || evidence[q] == Evidence::kFree) return true;
             const Segment& other = frame.prepared.segments[segment - 1];

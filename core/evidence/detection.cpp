@@ -122,6 +122,7 @@ void Detector::State::add(Frame& frame, std::size_t segment, std::span<const Pix
     detection.free_points = counted.free;
     detection.occupied_points = counted.occupied;
     detection.unknown_points = counted.unknown;
+    detection.edge_points = counted.edges;
 }
 
 /// Completes what may be moving and measures what needs the whole mask.

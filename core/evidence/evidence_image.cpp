@@ -21,7 +21,8 @@ Evidence judge(const CandidatePoints& points, std::size_t i) {
     if (receded || (points.free[i] >= 1.0F && points.occupied[i] <= points.free[i] + 1.0F)) return Evidence::kFree;
     // What has gone by less than surfaces can be told apart need not be what was there; leaves seem to come, too.
     const bool shifted = points.gone[i] >= 2.0F && points.came[i] == 0.0F;
-    return points.occupied[i] >= 1.0F && !shifted ? Evidence::kOccupied : Evidence::kUnknown;
+    if (points.occupied[i] < 1.0F || shifted) return Evidence::kUnknown;
+    return points.surface[i] >= 1.0F ? Evidence::kOccupied : Evidence::kEdge;
 }
 
 /// A return that no neighbour above or below, or none to both sides, is near to: a plate or wire thinner than the beams
@@ -90,13 +91,17 @@ EvidenceImage::Counts EvidenceImage::count(std::span<const PixelIndex> pixels) c
     // Three counters side by side in one word: an image has fewer than two million pixels.
     constexpr int kBits = 21;
     constexpr std::uint64_t kOne = 1, kMask = (kOne << kBits) - 1;
-    constexpr std::array<std::uint64_t, 4> kAdd{0, kOne, kOne << kBits, kOne << (2 * kBits)};
+    constexpr std::array<std::uint64_t, 5> kAdd{0, kOne, kOne << kBits, kOne << (2 * kBits), 0};
     static_assert(static_cast<int>(Evidence::kUnknown) == 1 && static_cast<int>(Evidence::kFree) == 2 &&
-                  static_cast<int>(Evidence::kOccupied) == 3);
+                  static_cast<int>(Evidence::kOccupied) == 3 && static_cast<int>(Evidence::kEdge) == 4);
     std::uint64_t sum = 0;
-    for (const PixelIndex pixel : pixels) sum += kAdd[image_[pixel]];
-    return {static_cast<int>(sum >> kBits & kMask), static_cast<int>(sum >> (2 * kBits)),
-            static_cast<int>(sum & kMask)};
+    int edges = 0;
+    for (const PixelIndex pixel : pixels) {
+        sum += kAdd[image_[pixel]];
+        edges += image_[pixel] >> 2U;
+    }
+    return {static_cast<int>(sum >> kBits & kMask), static_cast<int>(sum >> (2 * kBits)) + edges,
+            static_cast<int>(sum & kMask), edges};
 }
 
 void EvidenceImage::run(const Frame& frame) {

@@ -9,7 +9,13 @@
 
 namespace dlod {
 
-enum class Evidence : std::uint8_t { kUntested = 0, kUnknown = 1, kFree = 2, kOccupied = 3 };
+/// Edge: occupied, but no surface was seen at the place itself, only one that is nearer and another, farther one: what
+/// moves away past its own outline, or stands beside it, is found there as often as what stays.
+enum class Evidence : std::uint8_t { kUntested = 0, kUnknown = 1, kFree = 2, kOccupied = 3, kEdge = 4 };
+
+inline bool is_occupied(Evidence evidence) {
+    return evidence >= Evidence::kOccupied;
+}
 
 /// Chooses the pixels to test, tests them and keeps the result of one frame.
 class EvidenceImage {
@@ -26,11 +32,15 @@ class EvidenceImage {
     void forget() { references_.clear(); }
 
     Evidence operator[](PixelIndex pixel) const { return static_cast<Evidence>(image_[pixel]); }
+    /// Something was seen at the place, and be it an edge.
+    bool was_occupied(PixelIndex pixel) const { return is_occupied((*this)[pixel]); }
     /// Tested pixels by what they say.
     struct Counts {
         int free = 0, occupied = 0, unknown = 0;
+        int edges = 0;  ///< of the occupied ones
         void add(Evidence evidence) {
-            (evidence == Evidence::kFree ? free : evidence == Evidence::kOccupied ? occupied : unknown) += 1;
+            (evidence == Evidence::kFree ? free : is_occupied(evidence) ? occupied : unknown) += 1;
+            edges += evidence == Evidence::kEdge ? 1 : 0;
         }
     };
     Counts count(std::span<const PixelIndex> pixels) const;

@@ -28,6 +28,7 @@ struct CompareParameters {
 struct CompareResults {
     float* __restrict free;  // sums
     float* __restrict occupied;
+    float* __restrict surface;
     float* __restrict gap;    // by how much something nearer hid the point,
     float* __restrict cover;  // and the farthest that was seen there
 };
@@ -56,9 +57,12 @@ DLOD_MULTIVERSION_512 void compare(const CompareParameters& parameters, int n, c
             const float gap = r - nearest;
             const bool known = (pixel[begin + i] >= 0) & (seen != 0U);
             const bool is_free = known & (gap < -margin);
-            const bool is_occupied = known & (gap >= -p.tolerance - grown) & (farthest >= r - p.tolerance - grown);
+            const float reach = p.tolerance + grown;
+            const bool is_occupied = known & (gap >= -reach) & (farthest >= r - reach);
+            const bool is_between = (gap > reach) & (farthest > r + reach);
             out.free[begin + i] += is_free ? 1.0F : 0.0F;
             out.occupied[begin + i] += is_occupied ? p.occupied_weight : 0.0F;
+            out.surface[begin + i] += is_occupied & !is_between ? p.occupied_weight : 0.0F;
             out.gap[begin + i] = known ? gap : kUnknownGap;
             out.cover[begin + i] = known ? r - farthest : kUnknownGap;
         }
@@ -219,8 +223,8 @@ void FreeSpace::compare_block(const Comparison& comparison, const Eigen::Isometr
                                        static_cast<float>(config_.receding_margin_m),
                                        static_cast<float>(config_.receding_margin_per_m),
                                        1.0F / comparison.age_s};
-    const CompareResults results{points.free.data() + begin, points.occupied.data() + begin, gap_.data(),
-                                 cover_.data()};
+    const CompareResults results{points.free.data() + begin, points.occupied.data() + begin,
+                                 points.surface.data() + begin, gap_.data(), cover_.data()};
     compare(parameters, n, pixel_.data(), range_.data(), comparison.reference.cells.data(), results);
     if (comparison.order < CandidatePoints::kShifts) {
         measure_shift(narrow_bits_, static_cast<float>(config_.shift_margin_m),
@@ -268,7 +272,8 @@ void FreeSpace::test_block(const Comparison& comparison, int begin, int n, Candi
 
 void FreeSpace::test(const Frame& frame, std::span<const Reference* const> references, const Reference& now,
                      CandidatePoints& points) {
-    for (auto* v : {&points.free, &points.occupied, &points.gone, &points.came}) v->assign(points.size(), 0.0F);
+    for (auto* v : {&points.free, &points.occupied, &points.surface, &points.gone, &points.came})
+        v->assign(points.size(), 0.0F);
     points.slowest.assign(points.size(), static_cast<float>(config_.min_receding_mps));
     points.fastest.assign(points.size(), kFastest_mps);
     for (auto& shift : points.shift) shift.assign(points.size(), CandidatePoints::kNoShift);

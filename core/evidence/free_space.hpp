@@ -64,6 +64,8 @@ struct CandidatePoints {
     AlignedVector<float> x, y, z;         ///< sensor frame at the stamp, deskewed
     AlignedVector<float> free, occupied;  ///< results: for how many references the place was free, and was occupied;
                                           ///< the latter weighted by age, since what moves slowly was here just before
+    AlignedVector<float> surface;         ///< results: as occupied, by those that saw a surface there, not an edge
+                                          ///< between a nearer and a farther one
     AlignedVector<float> gone;            ///< results: in how many references something hid the place that is gone now
     AlignedVector<float> came;            ///< results: how many recent references saw only farther surfaces there
     AlignedVector<float> slowest, fastest;  ///< speeds at which that can have moved away to here; none: it did not

@@ -73,8 +73,7 @@ bool MovingParts::grow(const Frame& frame, const Segment& segment, const Evidenc
         const std::array<PixelIndex, 4> neighbours{p - width, p + width, column == 0 ? p + width - 1 : p - 1,
                                                    column + 1 == width ? p + 1 - width : p + 1};
         for (const PixelIndex q : neighbours) {
-            if (q >= size || state_[q] != kFresh || frame.prepared.segment[q] != label ||
-                evidence[q] == Evidence::kOccupied)
+            if (q >= size || state_[q] != kFresh || frame.prepared.segment[q] != label || evidence.was_occupied(q))
                 continue;
             const float step = Eigen::Vector3f(odometry.x[q] - odometry.x[p], odometry.y[q] - odometry.y[p],
                                                odometry.z[q] - odometry.z[p])

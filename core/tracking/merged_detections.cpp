@@ -278,6 +278,7 @@ void MergedDetections::divide_one(Frame& frame, DetectionShapes& shapes, std::si
         part.free_points = shared(whole.free_points);
         part.occupied_points = shared(whole.occupied_points);
         part.unknown_points = shared(whole.unknown_points);
+        part.edge_points = shared(whole.edge_points);
         for (std::size_t i = 0; i < whole.count; ++i) {
             if (owner_[i] != k) continue;
             frame.detection.pixels[to] = pixels_[i];

@@ -169,8 +169,8 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
         residual_sum += part.average_residual_m * part.residual_points;
         cues.residual_points += part.residual_points;
         cues.free_points += part.free_points;
-        cues.occupied_points += part.occupied_points;
-        cues.unknown_points += part.unknown_points;
+        cues.occupied_points += part.occupied_points - part.edge_points;
+        cues.unknown_points += part.unknown_points + part.edge_points;
         cues.turned = cues.turned || part.turned;
         points_ += static_cast<int>(part.count);
     }

@@ -44,6 +44,7 @@ struct Detection {
     int free_points = 0;
     int occupied_points = 0;
     int unknown_points = 0;
+    int edge_points = 0;  ///< of the occupied ones: between two surfaces that were seen, on none itself
     bool turned = false;  ///< a plane that lay at another angle in two earlier frames: sure to move, by these alone
     // A nearer surface borders the detection on that side: its true extent is hidden there.
     bool occluded_left = false;

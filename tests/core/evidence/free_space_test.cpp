@@ -91,7 +91,7 @@ TEST_P(Turning, StaticRoomIsOccupiedWhileTheSensorTurns) {
             if (k < 10) continue;
             ++tested;
             free += evidence[p] == Evidence::kFree ? 1 : 0;
-            occupied += evidence[p] == Evidence::kOccupied ? 1 : 0;
+            occupied += is_occupied(evidence[p]) ? 1 : 0;
         }
     }
     ASSERT_GT(tested, 50000);
@@ -100,6 +100,38 @@ TEST_P(Turning, StaticRoomIsOccupiedWhileTheSensorTurns) {
 }
 
 INSTANTIATE_TEST_SUITE_P(YawRates, Turning, testing::Values(0.0, 1.5, -1.5));
+
+/// Something comes into view beside an edge: there no surface was seen, only the nearer one and the farther one.
+TEST(FreeSpace, NoSurfaceWasSeenBetweenTheTwoOfAnEdge) {
+    const SensorModel sensor = staggered_sensor();
+    Frame frame(sensor);
+    EvidenceImage evidence(sensor, {});
+    bool appeared = false;
+    const auto scene = [&](const auto& o, const auto& d) {
+        const double wall = test::plane_range(Eigen::Vector3d::UnitX(), 16.0, o, d);
+        const double pillar = test::box_range({8.0, -0.3, -0.5}, {8.4, 0.3, 4.0}, o, d);
+        const double range = test::nearest(pillar, wall);
+        return appeared ? test::nearest(range, test::box_range({11.0, -0.6, -0.5}, {11.4, 0.6, 4.0}, o, d)) : range;
+    };
+    for (int k = 0; k < 12; ++k) {
+        appeared = k == 11;
+        render_sweep(sensor, scene, k, 0.0, frame);
+        evidence.begin(frame);
+        for (PixelIndex p = 0; p < sensor.pixels(); ++p) {
+            if (frame.cloud.range_m[p] > 0.0F) evidence.request(p);
+        }
+        evidence.run(frame);
+    }
+    long edges = 0, surfaces = 0;
+    for (const PixelIndex p : evidence.tested()) {
+        const double x = frame.odometry.x[p] + frame.odometry.T_world_sensor.translation().x();
+        if (x < 10.5 || x > 12.0) continue;
+        edges += evidence[p] == Evidence::kEdge ? 1 : 0;
+        surfaces += evidence[p] == Evidence::kOccupied ? 1 : 0;
+    }
+    EXPECT_GT(edges, 10);
+    EXPECT_EQ(surfaces, 0);
+}
 
 /// Nobody has ever seen the place free that it enters; but where it was before is seen free now.
 TEST(FreeSpace, WhatMovesAwayIsNoLongerWhereItWas) {
