@@ -25,11 +25,13 @@ constexpr double kClockJump_turns = 0.5;
 
 }  // namespace
 
-FrameBuilder::FrameBuilder(const SensorInfo& info, const FrameBuilderConfig& config, Acquire acquire, Emit emit)
+FrameBuilder::FrameBuilder(const SensorInfo& info, const FrameBuilderConfig& config, Acquire acquire, Emit emit,
+                           SeeImu see_imu)
     : info_(info),
       config_(config),
       acquire_(std::move(acquire)),
       emit_(std::move(emit)),
+      see_imu_(std::move(see_imu)),
       layout_(info.layout()),
       decoder_(layout_, info.model),
       clock_(info.model.width, info.model.frame_period_s * 1e9, config.time_tolerance_turns),
@@ -74,6 +76,7 @@ void FrameBuilder::push_imu(const Packet& packet) {
     }
     ++counters_.imu_packets;
     counters_.imu_rejected_samples.add(imu_.push(*sample));
+    if (see_imu_) see_imu_(*sample);
 }
 
 void FrameBuilder::push_lidar(const Packet& packet) {

@@ -44,9 +44,13 @@ class FrameBuilder {
     /// Takes over a finished frame.
     using Emit = std::function<void(Frame*)>;
 
+    /// Sees each reading of the sensor's IMU as it comes, before its frame.
+    using SeeImu = std::function<void(const ImuSample&)>;
+
     static constexpr int kPacketsToClose = 4;
 
-    FrameBuilder(const SensorInfo& info, const FrameBuilderConfig& config, Acquire acquire, Emit emit);
+    FrameBuilder(const SensorInfo& info, const FrameBuilderConfig& config, Acquire acquire, Emit emit,
+                 SeeImu see_imu = {});
     FrameBuilder(const FrameBuilder&) = delete;
     FrameBuilder& operator=(const FrameBuilder&) = delete;
 
@@ -117,6 +121,7 @@ class FrameBuilder {
     FrameBuilderConfig config_;
     Acquire acquire_;
     Emit emit_;
+    SeeImu see_imu_;
     PacketLayout layout_;
     PixelDecoder decoder_;
     ColumnClock clock_;

@@ -86,21 +86,14 @@ Eigen::Vector3d MotionFilter::lasting(const MotionState& s, const Eigen::Vector3
 
 /// Moves the state by dt, which may be negative, with the readings in the middle.
 void MotionFilter::advance(MotionState& s, std::int64_t mid_ns, double dt) const {
-    Eigen::Vector3d rate = s.rate_radps;
-    Eigen::Vector3d acceleration;
     if (imu_ != nullptr && !imu_->is_silent_at(mid_ns)) {
-        const ImuBuffer::Reading reading = imu_->at(mid_ns);
-        rate = reading.angular_velocity_radps - s.rate_radps;
-        const Eigen::Quaterniond middle = s.rotation * so3_exp(0.5 * dt * rate);
-        acceleration = middle * (reading.acceleration_mps2 - s.accelerometer_bias_mps2) + s.gravity_mps2;
-    } else {
-        // A constant velocity in the body's axes: the path is an arc.
-        if (imu_ != nullptr) rate = lasting(s, imu_->mean_rate_before(mid_ns) - s.rate_radps);
-        acceleration = (s.rotation * rate).cross(s.velocity_mps);
+        dlod::advance(s, imu_->at(mid_ns), dt);
+        return;
     }
-    s.rotation = (s.rotation * so3_exp(dt * rate)).normalized();
-    s.position_m += dt * s.velocity_mps + 0.5 * dt * dt * acceleration;
-    s.velocity_mps += dt * acceleration;
+    // A constant velocity in the body's axes: the path is an arc.
+    const Eigen::Vector3d rate =
+        imu_ != nullptr ? lasting(s, imu_->mean_rate_before(mid_ns) - s.rate_radps) : s.rate_radps;
+    dlod::advance(s, rate, (s.rotation * rate).cross(s.velocity_mps), dt);
 }
 
 void MotionFilter::predict(std::int64_t stamp_ns) {
@@ -350,6 +343,15 @@ Eigen::Vector3d MotionFilter::sensor_linear_velocity() const {
     const Eigen::Vector3d body = state_.rotation.conjugate() * state_.velocity_mps +
                                  body_rate(state_, stamp_ns_).cross(T_body_sensor_.translation());
     return T_body_sensor_.linear().transpose() * body;
+}
+
+ImuCorrection MotionFilter::imu_correction() const {
+    ImuCorrection correction;
+    if (imu_ != nullptr) correction.gyro_bias_radps = state_.rate_radps;
+    correction.accelerometer_bias_mps2 = state_.accelerometer_bias_mps2;
+    correction.gravity_mps2 = state_.gravity_mps2;
+    correction.velocity_covariance = covariance_.block<3, 3>(kVelocity, kVelocity);
+    return correction;
 }
 
 Matrix6d MotionFilter::pose_covariance() const {

@@ -10,9 +10,11 @@
 #include <cstdint>
 
 #include "core/odometry/imu_buffer.hpp"
+#include "core/odometry/motion_state.hpp"
 #include "core/registration/normal_equations.hpp"
 #include "core/registration/observability.hpp"
 #include "core/registration/sweep_motion.hpp"
+#include "core/types/frame.hpp"
 #include "core/types/lie.hpp"
 #include "core/types/parameter.hpp"
 
@@ -47,16 +49,6 @@ struct MotionFilterConfig {
         v.parameter("information_share_without_imu", information_share_without_imu, Range{1e-4, 1.0}, "",
                     "the same without IMU; lower takes the motion to be smoother");
     }
-};
-
-struct MotionState {
-    Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  ///< world from body
-    Eigen::Vector3d position_m = Eigen::Vector3d::Zero();          ///< of the body, world
-    Eigen::Vector3d velocity_mps = Eigen::Vector3d::Zero();        ///< of the body, world
-    Eigen::Vector3d rate_radps =
-        Eigen::Vector3d::Zero();  ///< body: bias of the gyroscope, or without IMU the angular velocity
-    Eigen::Vector3d accelerometer_bias_mps2 = Eigen::Vector3d::Zero();
-    Eigen::Vector3d gravity_mps2 = Eigen::Vector3d(0.0, 0.0, -9.80665);
 };
 
 class MotionFilter {
@@ -109,6 +101,8 @@ class MotionFilter {
     /// @param gravity_deviation_mps2 standard deviation of that, each axis
     void begin_world(const Eigen::Isometry3d& T_world_sensor, double gravity_deviation_mps2);
     void set_gravity(const Eigen::Vector3d& gravity_mps2) { state_.gravity_mps2 = gravity_mps2; }
+    /// What the IMU's readings carry the motion on with.
+    ImuCorrection imu_correction() const;
     Eigen::Isometry3d T_world_sensor() const;
     Eigen::Vector3d sensor_linear_velocity() const;   ///< sensor frame
     Eigen::Vector3d sensor_angular_velocity() const;  ///< sensor frame

@@ -17,7 +17,7 @@ void Odometry::write_result(Frame& frame) {
     out.T_world_sensor = filter_.T_world_sensor();
     out.linear_velocity_mps = filter_.sensor_linear_velocity();
     out.angular_velocity_radps = filter_.sensor_angular_velocity();
-    out.gravity_mps2 = filter_.state().gravity_mps2;
+    out.imu = filter_.imu_correction();
     out.iterations = registration_.iterations();
     out.correspondences = static_cast<int>(now_.registered ? registration_.matches().count : 0);
     out.void_scan_ns = now_.void_scan_ns;
@@ -82,7 +82,7 @@ void Odometry::write_nothing(Frame& frame) const {
     out.linear_velocity_mps.setZero();
     out.angular_velocity_radps.setZero();
     out.covariance.setZero();
-    out.gravity_mps2 = filter_.state().gravity_mps2;
+    out.imu = filter_.imu_correction();
     out.valid = false;
     out.keyframe = false;
     out.void_scan_ns.reset();

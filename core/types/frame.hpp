@@ -78,6 +78,22 @@ struct Preparation {
     PointSelection points;             ///< input of the registration
 };
 
+/// Where the sensor is and how it moves at some moment.
+struct SensorMotion {
+    Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
+    Eigen::Vector3d linear_velocity_mps = Eigen::Vector3d::Zero();     ///< sensor frame
+    Eigen::Vector3d angular_velocity_radps = Eigen::Vector3d::Zero();  ///< sensor frame
+    Matrix6d covariance = Matrix6d::Zero();  ///< of translation, then rotation, world; as in OdometryResult
+};
+
+/// What the IMU's readings carry a motion on with.
+struct ImuCorrection {
+    Eigen::Vector3d gyro_bias_radps = Eigen::Vector3d::Zero();           ///< IMU frame
+    Eigen::Vector3d accelerometer_bias_mps2 = Eigen::Vector3d::Zero();   ///< IMU frame
+    Eigen::Vector3d gravity_mps2 = Eigen::Vector3d(0.0, 0.0, -9.80665);  ///< world frame
+    Eigen::Matrix3d velocity_covariance = Eigen::Matrix3d::Zero();       ///< of the sensor's velocity, world axes
+};
+
 /// Written by the odometry.
 struct OdometryResult {
     enum Flag : std::uint32_t {
@@ -104,7 +120,8 @@ struct OdometryResult {
     /// Of translation (world), then rotation (world, small angles), against the world frame as the first pose has fixed
     /// it: grows with the way. How well that frame is levelled is not in it.
     Matrix6d covariance = Matrix6d::Zero();
-    Eigen::Vector3d gravity_mps2 = Eigen::Vector3d(0.0, 0.0, -9.80665);  ///< world frame, as estimated
+    ImuCorrection imu;  ///< without IMU (see kImuUsed) gravity alone counts
+    SensorMotion motion() const { return {T_world_sensor, linear_velocity_mps, angular_velocity_radps, covariance}; }
     int iterations = 0;
     int correspondences = 0;
     bool keyframe = false;          ///< becomes a keyframe once its moving points have been removed

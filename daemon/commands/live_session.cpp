@@ -27,7 +27,8 @@ PipelineOptions pipeline_options(const Config& config) {
 
 std::unique_ptr<SessionMessages> make_messages(const Config& config, const driver::SensorInfo& sensor) {
     if (config.lcm.url == "none") return nullptr;
-    return std::make_unique<SessionMessages>(config.lcm, sensor, config.extrinsics.T_base_sensor());
+    return std::make_unique<SessionMessages>(config.lcm, sensor, config.method.odometry.motion,
+                                             config.extrinsics.T_base_sensor());
 }
 
 /// No packet for so long: the sensor is asked why.
@@ -60,7 +61,11 @@ LiveSession::LiveSession(const Config& config, const driver::SensorInfo& sensor,
 }
 
 FrameSinks LiveSession::sinks() {
-    return {.publish_pose = [this](PipelineFrame& frame) { publish_pose(frame); },
+    return {.imu =
+                [this](const ImuSample& sample) {
+                    if (messages_) messages_->publish_predicted_pose(sample);
+                },
+            .publish_pose = [this](PipelineFrame& frame) { publish_pose(frame); },
             .publish =
                 [this](PipelineFrame& frame) {
                     if (messages_) messages_->publish(frame, frame.utime_us);

@@ -126,6 +126,7 @@ ExitCode replay(const ReplayArguments& arguments) {
     Summary summary;
     FrameSinks sinks;
     if (messages) {
+        sinks.imu = [&](const ImuSample& sample) { messages->publish_predicted_pose(sample); };
         sinks.publish_pose = [&](PipelineFrame& frame) { messages->publish_pose(frame); };
         sinks.publish = [&](PipelineFrame& frame) { messages->publish(frame); };
     }

@@ -21,6 +21,7 @@ class ReplayMessages {
 
     /// The messages of a frame, its pose and the rest; utime is the packets' own time.
     void publish_pose(const PipelineFrame& frame) { messages_.publish_pose(frame, frame.header.stamp_ns / 1000); }
+    void publish_predicted_pose(const ImuSample& sample) { messages_.publish_predicted_pose(sample); }
     void publish(const PipelineFrame& frame) { messages_.publish(frame, frame.header.stamp_ns / 1000); }
     /// A frame is through.
     void add(const PipelineFrame& frame);

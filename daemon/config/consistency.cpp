@@ -15,7 +15,7 @@ namespace {
 
 /// What LCM takes as the name of a channel.
 constexpr std::size_t kLongestChannel = 63;
-constexpr std::size_t kLongestSuffix = 9;  // OBSTACLES
+constexpr std::size_t kLongestSuffix = 14;  // POSE_PREDICTED
 
 driver::IpAddress check_address(const char* key, const std::string& text) {
     const auto address = driver::parse_address(text);

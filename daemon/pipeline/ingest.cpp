@@ -11,9 +11,9 @@ Ingest::Ingest(driver::PacketSource& source, const driver::SensorInfo& sensor, c
       out_(out),
       intake_(intake),
       events_(events),
-      options_(options),
+      options_(std::move(options)),
       builder_(
-          sensor, config, [this] { return acquire(); }, [this](Frame* frame) { emit(frame); }) {}
+          sensor, config, [this] { return acquire(); }, [this](Frame* frame) { emit(frame); }, options_.imu) {}
 
 void Ingest::run() {
     const std::uint64_t before = emitted_frames();

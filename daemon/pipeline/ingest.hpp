@@ -19,6 +19,7 @@ class Ingest final : public Actor {
     struct Options {
         bool live = false;   ///< never wait for a free frame: drop the oldest one that waits
         bool paced = false;  ///< the source waits for packets: that is not counted as time of ingest
+        std::function<void(const ImuSample&)> imu = {};  ///< called with each reading of the IMU, as it comes
     };
 
     Ingest(driver::PacketSource& source, const driver::SensorInfo& sensor, const driver::FrameBuilderConfig& config,

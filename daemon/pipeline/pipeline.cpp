@@ -64,7 +64,9 @@ Pipeline::Pipeline(const driver::SensorInfo& sensor, const MethodConfig& method,
       map_(to_map_, to_write_, [this](PipelineFrame& frame) { update_map(frame); }),
       write_(to_write_, pool_.finished(), [this](PipelineFrame& frame) { write(frame); }),
       ingest_(source, sensor, frames, pool_, to_prepare_, prepare_, events_,
-              {.live = options_.live, .paced = receives_on_own_thread()}),
+              {.live = options_.live,
+               .paced = receives_on_own_thread(),
+               .imu = receives_on_own_thread() ? sinks_.imu : nullptr}),
       workers_(actors(), events_, [this] { signal_if_done(); }) {}
 
 Pipeline::~Pipeline() {

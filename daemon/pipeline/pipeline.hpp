@@ -25,6 +25,9 @@ namespace dlod::daemon {
 /// What becomes of a frame's results. Each is called on some worker, for one frame at a time, in order; what it throws
 /// ends the pipeline (Pipeline::rethrow_failure). An empty one is skipped.
 struct FrameSinks {
+    /// Each reading of the IMU, where packets are received in time (live, paced), on the thread that receives. Must not
+    /// throw.
+    std::function<void(const ImuSample&)> imu;
     std::function<void(PipelineFrame&)> publish_pose;  ///< as soon as the pose is known
     std::function<void(PipelineFrame&)> publish;       ///< when all else is
     std::function<void(PipelineFrame&)> write;
@@ -36,9 +39,9 @@ struct PipelineOptions {
     int waiting_frames = 2;  ///< live: more than these are dropped, oldest first; so are those that would be late
     double most_latency_turns = 2.0;  ///< live: a pose older than so many turns of the sensor is of no use to a
                                       ///< planner; 0: no frame is left out for being late
-    bool live = false;             ///< receive on a thread of its own, never wait for the stages
-    bool paced = false;            ///< replay in time: the source waits for packets, on a thread of its own
-    driver::BodyFilter body = {};  ///< of the robot itself
+    bool live = false;                ///< receive on a thread of its own, never wait for the stages
+    bool paced = false;               ///< replay in time: the source waits for packets, on a thread of its own
+    driver::BodyFilter body = {};     ///< of the robot itself
     std::function<void(int)> on_thread_start = {};  ///< on each thread, with its number; the last one receives
 };
 

@@ -33,6 +33,7 @@ struct LcmConfig {
     int utime_source = 0;
     bool commands = true;
     std::string bot_core_channel;
+    int predicted_pose_every = 0;
     ObstaclesConfig obstacles;
 
     template <class V>
@@ -41,7 +42,7 @@ struct LcmConfig {
                "LCM provider, say udpm://239.255.76.67:7667?ttl=1; none: publish nothing; empty: none in replay, LCM's "
                "default live");
         v.text("channel_prefix", channel_prefix,
-               "put before POSE, MASK, TRACKS, STATUS, SENSOR, OBSTACLES and COMMAND");
+               "put before POSE, POSE_PREDICTED, MASK, TRACKS, STATUS, SENSOR, OBSTACLES and COMMAND");
         v.choice("utime_source", utime_source, {"host", "sensor"},
                  "host: utime is host time (UTC) when live; sensor: the packets' own time");
         v.flag("commands", commands, "carry out what comes on the channel COMMAND; off: nothing is listened to");
@@ -49,6 +50,9 @@ struct LcmConfig {
             "bot_core_channel", bot_core_channel,
             "channel on which poses are published as bot_core.pose_t too, say POSE; the prefix is not put before it; "
             "empty: none");
+        v.parameter("predicted_pose_every", predicted_pose_every, Range{0, 1000}, "IMU readings",
+                    "live and with replay --rate: a message POSE_PREDICTED every so many readings of the IMU, with the "
+                    "last pose carried on to then; 0: none");
         v.group("obstacles", obstacles, "points that are not ground, for planners that do not read packets");
     }
 };

@@ -13,14 +13,17 @@
 
 namespace dlod::daemon {
 
-/// T_odom_base and the base's motion of an odometry result; odom is the odometry's world frame.
+/// T_odom_base and the base's motion, after the sensor's; odom is the odometry's world frame.
 struct BaseMotion {
     Eigen::Isometry3d T_odom_base = Eigen::Isometry3d::Identity();
     Eigen::Vector3d linear_velocity_mps = Eigen::Vector3d::Zero();     ///< base frame
     Eigen::Vector3d angular_velocity_radps = Eigen::Vector3d::Zero();  ///< base frame
     Matrix6d covariance = Matrix6d::Zero();                            ///< of position, then rotation, in odom
 };
-BaseMotion base_motion(const OdometryResult& odometry, const Eigen::Isometry3d& T_base_sensor);
+BaseMotion base_motion(const SensorMotion& sensor, const Eigen::Isometry3d& T_base_sensor);
+
+/// All of the message but time, sequence and flags.
+void fill_pose(const BaseMotion& motion, pose_t& pose);
 
 /// For one thread, which may be another one than that of the frame's other messages.
 class PosePublisher {

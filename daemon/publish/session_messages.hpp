@@ -7,6 +7,7 @@
 #include "daemon/publish/frame_publisher.hpp"
 #include "daemon/publish/lcm_bus.hpp"
 #include "daemon/publish/pose_publisher.hpp"
+#include "daemon/publish/predicted_pose_publisher.hpp"
 #include "daemon/publish/sensor_announcer.hpp"
 
 namespace dlod::daemon {
@@ -14,9 +15,11 @@ namespace dlod::daemon {
 class SessionMessages {
   public:
     /// Opens LCM. @throws MessageBusError
-    SessionMessages(const LcmConfig& config, const driver::SensorInfo& sensor, const Eigen::Isometry3d& T_base_sensor)
+    SessionMessages(const LcmConfig& config, const driver::SensorInfo& sensor, const MotionFilterConfig& motion,
+                    const Eigen::Isometry3d& T_base_sensor)
         : bus_(config.url),
           poses_(bus_, T_base_sensor, config),
+          predicted_poses_(bus_, sensor.model, motion, T_base_sensor, config),
           frames_(bus_, sensor.model, T_base_sensor, config),
           sensor_(bus_, sensor, T_base_sensor, config.channel_prefix),
           status_(bus_),
@@ -25,7 +28,12 @@ class SessionMessages {
     MessageBus& bus() { return bus_; }
 
     /// A frame's pose. @param utime [us]. On one thread.
-    void publish_pose(const Frame& frame, std::int64_t utime) { poses_.publish(frame, utime); }
+    void publish_pose(const Frame& frame, std::int64_t utime) {
+        poses_.publish(frame, utime);
+        predicted_poses_.see(frame, utime);
+    }
+    /// Where the robot is by now. On the thread that receives.
+    void publish_predicted_pose(const ImuSample& sample) { predicted_poses_.publish(sample); }
     /// The rest of its results. @param utime [us]. On one thread, which may be another one.
     void publish(const Frame& frame, std::int64_t utime) { frames_.publish(frame, utime); }
 
@@ -36,11 +44,14 @@ class SessionMessages {
     void send(const status_t& status) { status_.send(status_channel_, status); }
 
     /// Messages that could not be sent; from any thread.
-    std::uint64_t failed() const { return poses_.failed() + frames_.failed() + sensor_.failed() + status_.failed(); }
+    std::uint64_t failed() const {
+        return poses_.failed() + predicted_poses_.failed() + frames_.failed() + sensor_.failed() + status_.failed();
+    }
 
   private:
     LcmBus bus_;
     PosePublisher poses_;
+    PredictedPosePublisher predicted_poses_;
     FramePublisher frames_;
     SensorAnnouncer sensor_;
     MessageSender status_;

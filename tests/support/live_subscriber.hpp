@@ -25,6 +25,7 @@ class LiveSubscriber {
     LiveSubscriber(const std::string& url, const std::string& prefix) : lcm_(url) {
         if (!lcm_.good()) return;
         lcm_.subscribe(prefix + "POSE", &LiveSubscriber::on_pose, this)->setQueueCapacity(kQueue);
+        lcm_.subscribe(prefix + "POSE_PREDICTED", &LiveSubscriber::on_predicted, this)->setQueueCapacity(kQueue);
         lcm_.subscribe(prefix + "MASK", &LiveSubscriber::on_mask, this)->setQueueCapacity(kQueue);
         lcm_.subscribe(prefix + "TRACKS", &LiveSubscriber::on_tracks, this)->setQueueCapacity(kQueue);
         lcm_.subscribe(prefix + "STATUS", &LiveSubscriber::on_status, this)->setQueueCapacity(kQueue);
@@ -43,6 +44,7 @@ class LiveSubscriber {
 
     /// In the order in which they came.
     std::vector<pose_t> poses() const { return copy(poses_); }
+    std::vector<pose_t> predicted_poses() const { return copy(predicted_poses_); }
     std::vector<status_t> statuses() const { return copy(statuses_); }
     std::size_t pose_count() const {
         const std::lock_guard lock(mutex_);
@@ -56,6 +58,7 @@ class LiveSubscriber {
     void clear() {
         const std::lock_guard lock(mutex_);
         poses_.clear();
+        predicted_poses_.clear();
         masks_.clear();
         tracks_.clear();
         statuses_.clear();
@@ -83,6 +86,10 @@ class LiveSubscriber {
         const std::lock_guard lock(mutex_);
         poses_.push_back(*m);
     }
+    void on_predicted(const lcm::ReceiveBuffer*, const std::string&, const pose_t* m) {
+        const std::lock_guard lock(mutex_);
+        predicted_poses_.push_back(*m);
+    }
     void on_mask(const lcm::ReceiveBuffer*, const std::string&, const dynamic_mask_t* m) {
         const std::lock_guard lock(mutex_);
         masks_[m->sequence] = m->utime;
@@ -99,6 +106,7 @@ class LiveSubscriber {
     lcm::LCM lcm_;
     mutable std::mutex mutex_;
     std::vector<pose_t> poses_;
+    std::vector<pose_t> predicted_poses_;
     std::map<std::int64_t, std::int64_t> masks_;
     std::map<std::int64_t, std::int64_t> tracks_;
     std::vector<status_t> statuses_;

@@ -47,7 +47,7 @@ class OdometryRun {
         const double stamp = drive_.last_stamp_s();
         const OdometryResult& o = frame_.odometry;
         return frames.emplace_back(RunFrame{o.valid, o.flags, o.T_world_sensor, drive_.pose(stamp), o.covariance,
-                                            o.gravity_mps2, o.linear_velocity_mps});
+                                            o.imu.gravity_mps2, o.linear_velocity_mps});
     }
     void run(int first, int last) {
         for (int k = first; k < last; ++k) step(k);

@@ -16,7 +16,7 @@ void spoil(OdometryResult& result) {
     result.linear_velocity_mps.setConstant(nan);
     result.angular_velocity_radps.setConstant(nan);
     result.covariance.setConstant(nan);
-    result.gravity_mps2.setConstant(nan);
+    result.imu.gravity_mps2.setConstant(nan);
     result.iterations = result.correspondences = -1;
     result.residual_pixel.assign(10, 5);
     result.residual_m.assign(10, 1.0F);
@@ -40,7 +40,7 @@ TEST(EmptyFrames, HoldNothingOfTheFrameThatWasThereBefore) {
         spoil(frame.odometry);
         odometry.process(frame, nullptr);
         const OdometryResult& o = frame.odometry;
-        EXPECT_TRUE(o.T_world_sensor.matrix().allFinite() && o.covariance.allFinite() && o.gravity_mps2.allFinite());
+        EXPECT_TRUE(o.T_world_sensor.matrix().allFinite() && o.covariance.allFinite() && o.imu.gravity_mps2.allFinite());
         EXPECT_TRUE(o.linear_velocity_mps.allFinite() && o.angular_velocity_radps.allFinite());
         if (k == 0 || k == 9) {
             EXPECT_FALSE(o.valid || o.keyframe);

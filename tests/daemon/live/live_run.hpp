@@ -45,7 +45,7 @@ class LiveRun {
     /// @param sensor the keys of the group, as in "host: a, lidar_port: 1"; more: whole groups, a line each
     void write_config(const std::string& sensor, const std::string& more = "") const {
         std::ofstream(config()) << "sensor: {" << sensor << "}\nlcm: {channel_prefix: TEST_, url: \"" << kLiveUrl
-                                << "\"}\n"
+                                << "\", predicted_pose_every: 1}\n"
                                 << more;
     }
     /// @param environment beyond systemd's, "NAME=value"

@@ -2,6 +2,7 @@
 // messages over LCM's multicast, counted by a real subscriber.
 #include <gtest/gtest.h>
 
+#include <Eigen/Core>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -46,6 +47,27 @@ void expect_same_by_replay(const std::filesystem::path& recording, const std::fi
     ASSERT_EQ(replay.wait(60s), 0) << replay.output();
     for (const char* name : {"trajectory.tum", "labels.bin", "instances.bin", "tracks.csv", "map.pcd"}) {
         EXPECT_TRUE(content(recording / "out" / name) == content(live / name)) << name << " differs";
+    }
+}
+
+/// Between frames the poses go on by the IMU, and end where the next frame's pose is.
+void expect_predicted_poses(const std::vector<pose_t>& predicted, const std::vector<pose_t>& poses) {
+    // A hundred readings a second; some come before the pose that they would carry on.
+    EXPECT_GT(predicted.size(), kSmall ? 0 : 5 * poses.size());
+    std::int64_t last = 0;
+    for (const pose_t& p : predicted) {
+        EXPECT_EQ(p.flags, +pose_t::VALID + +pose_t::IMU_USED + +pose_t::PREDICTED_ONLY);
+        EXPECT_GE(p.utime, last);
+        last = p.utime;
+        ASSERT_GE(p.sequence, 0);
+        ASSERT_LT(static_cast<std::size_t>(p.sequence), poses.size());
+        const pose_t& from = poses[static_cast<std::size_t>(p.sequence)];
+        EXPECT_GT(p.utime, from.utime - 5'000);
+        for (std::size_t next = static_cast<std::size_t>(p.sequence) + 1; next < poses.size(); ++next) {
+            if (std::abs(poses[next].utime - p.utime) > 5'000) continue;
+            const auto position = [](const pose_t& pose) { return Eigen::Vector3d::Map(pose.position); };
+            EXPECT_LT((position(poses[next]) - position(p)).norm(), 0.03) << "at frame " << next;
+        }
     }
 }
 
@@ -95,6 +117,8 @@ TEST(Live, NoFrameIsLostFromPacketToSubscriberAndTheRecordingGivesTheSame) {
         if (i == 0) continue;
         EXPECT_GT(poses[i].utime, poses[i - 1].utime);
     }
+
+    expect_predicted_poses(subscriber.predicted_poses(), poses);
 
     const auto statuses = subscriber.statuses();
     ASSERT_GE(statuses.size(), 3U);
