@@ -49,6 +49,25 @@ TEST(FrameBuilderImu, SamplesComeWithTheFrameTheyPrecede) {
     EXPECT_EQ(bench.faults(), 0U);
 }
 
+TEST(FrameBuilderImu, EachReadingIsSeenAsItComes) {
+    const SyntheticSensor sensor;
+    std::vector<std::int64_t> seen;
+    FrameBuilder builder(
+        sensor.info(), {}, [] { return nullptr; }, [](Frame*) {},
+        [&](const ImuSample& sample) { seen.push_back(sample.stamp_ns); });
+    const auto push = [&](const std::vector<std::byte>& bytes, std::byte sender) {
+        builder.push(
+            {.data = bytes, .receive_ns = 0, .sender_address = {sender}, .sender_port = 0, .destination_port = 0});
+    };
+    push(sensor.packet(1, 0), std::byte{1});
+    push(imu_packet(10), std::byte{1});
+    EXPECT_EQ(seen, std::vector<std::int64_t>{10}) << "before its frame";
+    push(imu_packet(20), std::byte{2});
+    push(imu_packet(30, std::numeric_limits<float>::quiet_NaN()), std::byte{1});
+    push(imu_packet(40), std::byte{1});
+    EXPECT_EQ(seen, (std::vector<std::int64_t>{10, 40})) << "neither a stranger's nor what is no reading";
+}
+
 TEST(FrameBuilderImu, FaultsAreCounted) {
     const SyntheticSensor sensor;
     BuilderBench bench(sensor);

@@ -85,7 +85,7 @@ TEST(PosePublisher, TheCovarianceIsMovedToTheBase) {
     Vector6d sigma;
     sigma << 0.01, 0.02, 0.03, 0.004, 0.002, 0.003;
     odometry.covariance = sigma.cwiseAbs2().asDiagonal();
-    const BaseMotion motion = base_motion(odometry, T_base_sensor);
+    const BaseMotion motion = base_motion(odometry.motion(), T_base_sensor);
     std::mt19937 random(3);
     std::normal_distribution<double> normal;
     Matrix6d sampled = Matrix6d::Zero();
