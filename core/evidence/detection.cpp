@@ -14,6 +14,7 @@ struct Detector::State {
         : config(c),
           residuals(sensor),
           evidence(sensor, c.free_space),
+          openings(sensor, c.openings),
           parts(sensor, c.parts),
           plates(sensor, c.plates, evidence.narrow_bits()),
           completion(sensor, c.completion),
@@ -26,7 +27,7 @@ struct Detector::State {
 
     void test(const Frame& frame);
     void find_plates(const Frame& frame);
-    void count(const Frame& frame);
+    void run(const Frame& frame);
     bool is_compact(const Segment& segment) const;
     bool is_divided(const Segment& segment, std::size_t s) const;
     void detect(Frame& frame);
@@ -36,6 +37,7 @@ struct Detector::State {
     DetectionConfig config;
     ResidualImage residuals;
     EvidenceImage evidence;
+    FramedOpenings openings;
     MovingParts parts;
     TurnedPlates plates;
     Completion completion;
@@ -46,7 +48,10 @@ struct Detector::State {
     std::vector<PixelIndex> completed;  ///< pixels of the completed detections, swapped with the frame's
 };
 
-void Detector::State::count(const Frame& frame) {
+/// Tests what was asked for, and counts it by segment.
+void Detector::State::run(const Frame& frame) {
+    evidence.run(frame);
+    openings.take_back(frame, whole, evidence);
     for (const PixelIndex pixel : evidence.tested()) {
         counts[frame.prepared.segment[pixel] - 1].add(evidence[pixel]);
     }
@@ -71,6 +76,7 @@ bool Detector::State::is_divided(const Segment& segment, std::size_t s) const {
 
 void Detector::State::test(const Frame& frame) {
     evidence.begin(frame);
+    openings.begin();
     parts.begin();
     const Preparation& prepared = frame.prepared;
     counts.assign(prepared.segments.size(), {});
@@ -88,15 +94,13 @@ void Detector::State::test(const Frame& frame) {
             if (static_cast<double>(frame.cloud.range_m[pixel]) <= config.max_range_m) evidence.request(pixel);
         }
     }
-    evidence.run(frame);
-    count(frame);
+    run(frame);
     plates.begin();
     if (config.use_plates) plates.request(frame, whole, evidence);
     for (std::size_t s = 0; s < prepared.segments.size(); ++s) {
         if (is_divided(prepared.segments[s], s)) parts.request_around(frame, prepared.segments[s], evidence);
     }
-    evidence.run(frame);
-    count(frame);
+    run(frame);
     if (config.use_plates) find_plates(frame);
 }
 

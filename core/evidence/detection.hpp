@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "core/evidence/completion.hpp"
+#include "core/evidence/framed_openings.hpp"
 #include "core/evidence/free_space.hpp"
 #include "core/evidence/moving_parts.hpp"
 #include "core/evidence/turned_plates.hpp"
@@ -24,6 +25,7 @@ struct DetectionConfig {
     double mixed_share = 0.25;
     double compact_m = 1.2;
     FreeSpaceConfig free_space;
+    FramedOpeningsConfig openings;
     MovingPartsConfig parts;
     TurnedPlatesConfig plates;
     CompletionConfig completion;
@@ -46,6 +48,7 @@ struct DetectionConfig {
         v.parameter("compact_m", compact_m, Range{0.0, 10.0}, "m",
                     "segments no wider than this are divided only where most of the evidence says occupied");
         v.group("free_space", free_space, "comparison with earlier frames");
+        v.group("openings", openings, "windows of what stands");
         v.group("parts", parts, "moving parts of segments");
         v.group("plates", plates, "doors, gates and other plates that turn");
         v.group("completion", completion, "pixels at the edges and feet of objects");

@@ -1,0 +1,74 @@
+#include "core/evidence/framed_openings.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace dlod {
+namespace {
+
+constexpr float kLeastRow_rad = 1e-3F;  // no sensor's rows are closer
+
+}  // namespace
+
+FramedOpenings::FramedOpenings(const SensorModel& sensor, const FramedOpeningsConfig& config)
+    : config_(config),
+      tiles_((sensor.height + kTileRows - 1) / kTileRows, (sensor.width + kTileColumns - 1) / kTileColumns),
+      tile_height_rad_(std::max(kLeastRow_rad, std::abs(sensor.altitude_rad.front() - sensor.altitude_rad.back()) /
+                                                   static_cast<float>(std::max(1, sensor.height - 1))) *
+                       kTileRows),
+      tile_width_rad_(static_cast<float>(kTileColumns * 2.0 * std::numbers::pi / sensor.width)) {}
+
+void FramedOpenings::begin() {
+    tiles_.fill({});
+}
+
+bool FramedOpenings::met(int row, int column, int row_step, int column_step, int steps, float nearest_m,
+                         float farthest_m) const {
+    const int width = tiles_.width();
+    for (int i = 1; i <= steps; ++i) {
+        // Beside it three rows of tiles: not every pixel is tested.
+        const int aside = std::abs(column_step);
+        const int c = (column + i * column_step + width) % width;
+        for (int r = row + i * row_step - aside; r <= row + i * row_step + aside; ++r) {
+            if (r < 0 || r >= tiles_.height()) continue;
+            const Tile& tile = tiles_(r, c);
+            if (tile.farthest_m >= nearest_m && tile.nearest_m <= farthest_m) return true;
+        }
+    }
+    return false;
+}
+
+void FramedOpenings::take_back(const Frame& frame, std::span<const std::uint8_t> compact, EvidenceImage& evidence) {
+    if (config_.reach_m <= 0.0) return;
+    const auto width = static_cast<PixelIndex>(frame.cloud.range_m.width());
+    const auto row_of = [&](PixelIndex pixel) { return static_cast<int>(pixel / width) / kTileRows; };
+    const auto column_of = [&](PixelIndex pixel) { return static_cast<int>(pixel % width) / kTileColumns; };
+    for (const PixelIndex pixel : evidence.tested()) {
+        const std::size_t segment = frame.prepared.segment[pixel] - 1;
+        if (evidence[pixel] != Evidence::kOccupied || compact[segment] != 0) continue;
+        if (!frame.prepared.segments[segment].feasible) continue;
+        Tile& tile = tiles_(row_of(pixel), column_of(pixel));
+        const float range_m = frame.cloud.range_m[pixel];
+        tile.nearest_m = std::min(tile.nearest_m, range_m);
+        tile.farthest_m = std::max(tile.farthest_m, range_m);
+    }
+    for (const PixelIndex pixel : evidence.tested()) {
+        if (evidence[pixel] != Evidence::kFree) continue;
+        const int row = row_of(pixel);
+        const int column = column_of(pixel);
+        const float range_m = frame.cloud.range_m[pixel];
+        const float reach_rad = static_cast<float>(config_.reach_m) / std::max(0.5F, range_m);
+        const int rows = std::max(1, static_cast<int>(reach_rad / tile_height_rad_));
+        const int columns = std::clamp(static_cast<int>(reach_rad / tile_width_rad_), 1, tiles_.width() / 4);
+        const float nearest_m = range_m - static_cast<float>(config_.depth_m);
+        const float farthest_m = range_m + static_cast<float>(config_.tolerance_m);
+        const float top_m = range_m + static_cast<float>(config_.slant_m);
+        if (met(row, column, 1, 0, rows, nearest_m, farthest_m) && met(row, column, -1, 0, rows, nearest_m, top_m) &&
+            met(row, column, 0, -1, columns, nearest_m, farthest_m) &&
+            met(row, column, 0, 1, columns, nearest_m, farthest_m))
+            evidence.set(pixel, Evidence::kUnknown);
+    }
+}
+
+}  // namespace dlod
