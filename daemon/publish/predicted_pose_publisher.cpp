@@ -41,8 +41,11 @@ void PredictedPosePublisher::publish(const ImuSample& sample) {
     published_ns_ = prediction_.stamp_ns();
     readings_ = 0;
     fill_pose(base_motion(*motion, T_base_sensor_), pose_);
-    // The clocks' offset is judged anew with each frame: time must not go back for that.
-    pose_.utime = std::max(pose_.utime, start_.utime + (prediction_.stamp_ns() - start_.stamp_ns) / 1000);
+    // The clocks' offset is judged anew with each frame: time must not go back for that. What goes back farther than a
+    // pose is carried on is a clock that was set, or a sensor that starts anew, where utime is the sensor's.
+    const std::int64_t utime = start_.utime + (prediction_.stamp_ns() - start_.stamp_ns) / 1000;
+    const bool is_step = utime < pose_.utime - ImuPrediction::kMost_ns / 1000;
+    pose_.utime = is_step ? utime : std::max(pose_.utime, utime);
     pose_.sequence = start_.sequence;
     pose_.flags = +pose_t::VALID + +pose_t::IMU_USED + +pose_t::PREDICTED_ONLY;
     sender_.send(channel_, pose_);

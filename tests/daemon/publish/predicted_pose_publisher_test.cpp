@@ -100,5 +100,19 @@ TEST_F(PredictedPoseTest, TimeDoesNotGoBack) {
     EXPECT_GE(messages()[1].utime, messages()[0].utime);
 }
 
+TEST_F(PredictedPoseTest, TimeFollowsASensorThatStartsAnew) {
+    PredictedPosePublisher poses = publisher();
+    poses.see(frame, 3'600'000'000);
+    poses.publish(reading(1'010'000'000));
+    // Its clock counts from the start, and utime is the sensor's.
+    for (const std::int64_t start_ms : {100, 200}) {
+        frame.header.stamp_ns = 1'000'000 * start_ms;
+        poses.see(frame, 1000 * start_ms);
+        for (int i = 1; i <= 10; ++i) poses.publish(reading(1'000'000 * (start_ms + 10 * i)));
+    }
+    ASSERT_GT(messages().size(), 10U);
+    EXPECT_EQ(messages().back().utime, 300'000);
+}
+
 }  // namespace
 }  // namespace dlod::daemon
