@@ -20,6 +20,8 @@ constexpr double kFit_m = 0.05;
 // share of them.
 constexpr double kMinFacingPoints = 20.0;
 constexpr double kFoundShare = 0.25;
+// So many points that could speak for a motion over the ground are more than chance.
+constexpr double kTellingPoints = 50.0;
 // Level and biases, which a start under acceleration gets wrong, are known after so long: before, a prediction by the
 // IMU is no judge.
 constexpr double kSettling_s = 3.0;
@@ -126,6 +128,11 @@ MatchQuality FrameRegistration::quality() const {
         const double r = static_cast<double>(matches_.residual[i]) / kFit_m;
         quality.fit += (nx * nx + ny * ny) * std::max(-1.0, 1.0 - r * r);
     }
+    const PlacedPoints& placed = scan_.placed();
+    for (std::size_t i = 0; i < scan_.left_out().size(); ++i) {
+        if (scan_.points().planarity[i] <= 0.0F || scan_.left_out()[i]) continue;
+        quality.seen += static_cast<double>(placed.nx[i] * placed.nx[i] + placed.ny[i] * placed.ny[i]);
+    }
     return quality;
 }
 
@@ -133,6 +140,10 @@ bool FrameRegistration::is_trustworthy(const MatchQuality& quality) const {
     const auto count = static_cast<double>(matches_.count);
     return has_matches() && count >= kMinMatchedShare * static_cast<double>(scan_.candidates()) &&
            quality.near >= kMinNearShare * count;
+}
+
+bool FrameRegistration::contradicts(const MatchQuality& quality, double least_share) {
+    return quality.seen >= kTellingPoints && quality.fit < least_share * quality.seen;
 }
 
 bool FrameRegistration::is_beside_its_map(const Matrix6d& covariance, double max_deviation_m) const {

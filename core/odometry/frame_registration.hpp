@@ -18,6 +18,7 @@ namespace dlod {
 struct MatchQuality {
     double near = 0.0;  ///< matches that lie on their planes
     double fit = 0.0;   ///< what speaks for the motion over the ground, less what speaks against it
+    double seen = 0.0;  ///< what of the scan could speak for it
 };
 
 /// The present scan against the one before, for the guess, then against the submap, for the pose. A filter's prediction
@@ -51,6 +52,11 @@ class FrameRegistration {
     MatchQuality quality() const;
     /// Enough points have found the submap, and most of those lie on it.
     bool is_trustworthy(const MatchQuality& quality) const;
+    /// The scan shows what tells a motion over the ground, and next to nothing of it lies where the map has it. Matches
+    /// by chance, whose distances are any within the gate, speak against a motion: what is left is the ground, which
+    /// looks the same from everywhere.
+    /// @param least_share of what could speak for the motion, that has to
+    static bool contradicts(const MatchQuality& quality, double least_share);
     /// The pose may be anywhere along a direction that the prediction holds, and yet the scan shows surfaces that face
     /// this direction: it is no tunnel, the map around the believed pose is another place's.
     /// @param covariance of the pose: translation, rotation, world

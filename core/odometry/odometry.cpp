@@ -19,6 +19,9 @@ constexpr double kAway_rad = 1.0;
 // Gates open as the prediction's standard deviation grows beyond this.
 constexpr double kSureDeviation_m = 0.1;
 constexpr double kMaxWidening = 3.0;
+// Of what could speak for the motion over the ground, this share has to.
+constexpr double kLeastShare = 0.1;
+constexpr double kLeastShareAtStart = 0.2;
 
 Matrix6d away() {
     Vector6d deviation;
@@ -105,6 +108,7 @@ void Odometry::follow(const Frame& frame) {
         now_.registered = now_.registered || find_again(frame);
     }
     if (now_.registered) {
+        now_.trusted = !contradicts_map();
         bootstrap_.end();
         return;
     }
@@ -132,13 +136,26 @@ bool Odometry::register_frame(const Frame& frame) {
     }
     if (registration_.is_degenerate()) now_.flags |= OdometryResult::kDegenerate;
     now_.quality = registration_.quality();
-    if (registration_.is_trustworthy(now_.quality) &&
+    if (registration_.is_trustworthy(now_.quality) && !starts_badly() &&
         !registration_.is_beside_its_map(filter_.pose_covariance(), config_.max_deviation_m)) {
         accept();
         return true;
     }
     filter_.discard_update();
     return false;
+}
+
+/// Without IMU nothing supports the motion of a start but that the two scans fit.
+bool Odometry::starts_badly() const {
+    return bootstrap_.pending() && !filter_.uses_imu() &&
+           FrameRegistration::contradicts(now_.quality, kLeastShareAtStart);
+}
+
+/// Without IMU a sudden turn or shock can take the scan farther from its prediction than a registration finds back.
+/// What then holds the pose is the prediction, though the scan shows what faces those directions.
+bool Odometry::contradicts_map() const {
+    return registration_.is_degenerate() && !filter_.uses_imu() &&
+           FrameRegistration::contradicts(now_.quality, kLeastShare);
 }
 
 /// The registration is believed.

@@ -50,6 +50,8 @@ class Odometry {
     void begin_map_here(const Frame& frame, const Matrix6d& moved);
     void renew_map(const Frame& frame);
     bool register_frame(const Frame& frame);
+    bool starts_badly() const;
+    bool contradicts_map() const;
     void accept();
     void see_uncertainty();
     bool doubts_imu() const;
