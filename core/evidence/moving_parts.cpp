@@ -34,18 +34,30 @@ void MovingParts::request_around(const Frame& frame, const Segment& segment, Evi
     const double row_rad = std::abs(static_cast<double>(sensor_.altitude_rad.front() - sensor_.altitude_rad.back())) /
                            std::max(1, sensor_.height - 1);
     const std::uint32_t label = frame.prepared.segment[frame.prepared.pixels[segment.first]];
+    const int width = sensor_.width;
+    struct Window {
+        int row = -1, column = 0, rows = 0, columns = 0;
+    } last;
     for (const PixelIndex pixel : pixels_of(frame, segment)) {
         if (evidence[pixel] != Evidence::kFree) continue;
         const double reach_rad = config_.reach_m / std::max(0.5, static_cast<double>(frame.cloud.range_m[pixel]));
         const int columns = std::clamp(static_cast<int>(reach_rad / column_rad), 2, kMaxWindow);
         const int rows = std::clamp(static_cast<int>(reach_rad / row_rad), 2, kMaxWindow);
-        const int row = static_cast<int>(pixel) / sensor_.width;
-        const int column = static_cast<int>(pixel) % sensor_.width;
+        const int row = static_cast<int>(pixel) / width;
+        const int column = static_cast<int>(pixel) % width;
+        int from = column - columns;
+        const int to = column + columns;
+        // The windows of a row overlap: what the last one has asked for need not be looked at again.
+        if (row == last.row && rows <= last.rows && from >= last.column - last.columns)
+            from = std::max(from, last.column + last.columns + 1);
+        if (from > to) continue;
+        last = {row, column, rows, columns};
         for (int r = std::max(0, row - rows); r <= std::min(sensor_.height - 1, row + rows); ++r) {
-            for (int dc = -columns; dc <= columns; ++dc) {
-                const int c = (column + dc + sensor_.width) % sensor_.width;
-                const auto p = static_cast<PixelIndex>(r * sensor_.width + c);
+            int c = from < 0 ? from + width : from < width ? from : from - width;
+            for (int k = from; k <= to; ++k) {
+                const auto p = static_cast<PixelIndex>(r * width + c);
                 if (frame.prepared.segment[p] == label) evidence.request(p);
+                if (++c == width) c = 0;
             }
         }
     }
