@@ -22,6 +22,9 @@ constexpr double kKnownPose = 1e-4;           // standard deviation of the pose 
 constexpr double kUnknownVelocity_mps = 3.0;  // standard deviation at the start
 // Without IMU: time over which the robot's accelerations are averaged.
 constexpr double kMotionMemory_s = 1.0;
+// A body that has been seen not to move: how well velocity and turn rate are zero.
+constexpr double kStanding_mps = 1e-3;
+constexpr double kStanding_radps = 1e-3;
 // Variance of a block that the present mode does not know: so small that it stays what it is.
 constexpr double kFrozen = 1e-12;
 // A body at rest: how well its velocity is zero, and beyond how many standard deviations it is not believed to be.
@@ -110,6 +113,14 @@ void MotionFilter::predict(std::int64_t stamp_ns) {
         grow_covariance(before, (state_.velocity_mps - before.velocity_mps) / dt, dt);
         stamp_ns_ = target;
     }
+}
+
+void MotionFilter::stand(std::int64_t stamp_ns) {
+    state_.velocity_mps.setZero();
+    state_.rate_radps.setZero();
+    forget(kVelocity, kStanding_mps);
+    forget(kRate, kStanding_radps);
+    stamp_ns_ = stamp_ns;
 }
 
 void MotionFilter::grow_covariance(const MotionState& before, const Eigen::Vector3d& acceleration, double dt) {

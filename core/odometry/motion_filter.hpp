@@ -69,6 +69,8 @@ class MotionFilter {
     bool uses_imu() const { return imu_ != nullptr; }
 
     void predict(std::int64_t stamp_ns);
+    /// The same for a body that has been seen not to move; without IMU.
+    void stand(std::int64_t stamp_ns);
 
     /// The sweep that ends at the present state, in coordinates relative to `origin_m` (world).
     void sweep(double duration_s, const Eigen::Vector3d& origin_m, SweepMotion& motion) const;

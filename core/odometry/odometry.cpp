@@ -22,6 +22,9 @@ constexpr double kMaxWidening = 3.0;
 // Of what could speak for the motion over the ground, this share has to.
 constexpr double kLeastShare = 0.1;
 constexpr double kLeastShareAtStart = 0.2;
+// Without IMU the motion of a robot that stands is known no better than this.
+constexpr double kSlow_mps = 0.15;
+constexpr double kSlow_radps = 0.1;
 
 Matrix6d away() {
     Vector6d deviation;
@@ -38,6 +41,7 @@ Odometry::Odometry(const SensorModel& sensor, const OdometryConfig& config)
       filter_(config.motion, sensor.T_sensor_imu.inverse()),
       registration_(config.scan_to_scan, config.scan_to_submap),
       keyframes_(config.keyframes, config.voxels),
+      standstill_(sensor),
       bootstrap_(filter_),
       uncertainty_(config.surface_error_m) {}
 
@@ -121,13 +125,18 @@ void Odometry::follow(const Frame& frame) {
 /// Predicts the pose, and puts it where the scan fits the map.
 bool Odometry::register_frame(const Frame& frame) {
     PlacedScan& scan = registration_.scan();
-    filter_.predict(frame.header.stamp_ns);
+    const bool standing = stands(frame);
+    if (standing) {
+        filter_.stand(frame.header.stamp_ns);
+    } else {
+        filter_.predict(frame.header.stamp_ns);
+    }
     scan.choose_origin(filter_.state().position_m, keyframes_.submap().voxel_m());
     scan.move(filter_);
     if (!frame.header.usable) return false;
     keyframes_.update_submap(filter_.state().position_m);
     scan.leave_out(moving_);
-    if (bootstrap_.pending()) {
+    if (bootstrap_.pending() && !standing) {
         bootstrap_.align(registration_, filter_, keyframes_);
     } else {
         const double widening = std::clamp(filter_.position_deviation_m() / kSureDeviation_m, 1.0, kMaxWidening);
@@ -156,6 +165,14 @@ bool Odometry::starts_badly() const {
 bool Odometry::contradicts_map() const {
     return registration_.is_degenerate() && !filter_.uses_imu() &&
            FrameRegistration::contradicts(now_.quality, kLeastShare);
+}
+
+/// Without IMU, whose motion could not tell a robot that stands from one that is slow.
+bool Odometry::stands(const Frame& frame) {
+    if (!frame.header.usable || filter_.uses_imu()) return false;
+    const bool slow =
+        filter_.state().velocity_mps.norm() < kSlow_mps && filter_.state().rate_radps.norm() < kSlow_radps;
+    return standstill_.see(frame.prepared.points, slow);
 }
 
 /// The registration is believed.
@@ -244,6 +261,7 @@ void Odometry::begin_map(const Frame& frame, const Eigen::Isometry3d& T_world_se
     scan.choose_origin(filter_.state().position_m, keyframes_.submap().voxel_m());
     scan.move_all(filter_);
     bootstrap_.begin(scan, filter_);
+    standstill_.begin(frame.prepared.points);
     keyframes_.set_provisional(scan.cloud());
 }
 

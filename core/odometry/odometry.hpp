@@ -17,6 +17,7 @@
 #include "core/odometry/registered_motion.hpp"
 #include "core/odometry/relocalization.hpp"
 #include "core/odometry/spaciousness.hpp"
+#include "core/odometry/standstill.hpp"
 #include "core/odometry/usual_quality.hpp"
 #include "core/types/frame.hpp"
 
@@ -52,6 +53,7 @@ class Odometry {
     bool register_frame(const Frame& frame);
     bool starts_badly() const;
     bool contradicts_map() const;
+    bool stands(const Frame& frame);
     void accept();
     void see_uncertainty();
     bool doubts_imu() const;
@@ -72,6 +74,7 @@ class Odometry {
     FrameRegistration registration_;
     KeyframeDatabase keyframes_;
     MovingPoints moving_;
+    Standstill standstill_;
     Bootstrap bootstrap_;
     Levelling levelling_;
     Relocalization relocalization_;
