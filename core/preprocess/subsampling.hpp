@@ -14,6 +14,7 @@ struct SubsamplingConfig {
     int rough_step = 1;
     int points = 3000;
     int least_points = 2000;
+    int least_facing = 40;
     double spacing_m = 0.12;
     double min_range_m = 0.5;
     double crop_box_m = 0.5;
@@ -33,6 +34,9 @@ struct SubsamplingConfig {
                     "flat points kept, evened out over the directions of their normals");
         v.parameter("least_points", least_points, Range{0, 50000}, "points",
                     "with fewer flat points raw ones make up for them: many columns lost, or nothing flat");
+        v.parameter("least_facing", least_facing, Range{0, 50000}, "points",
+                    "with fewer flat points that face some direction all raw ones take part: between trees and bushes "
+                    "the ground is all that is flat");
         v.parameter("spacing_m", spacing_m, Range{0.0, 5.0}, "m",
                     "near surfaces are thinned to about this spacing along a row");
         v.parameter("min_range_m", min_range_m, Range{0.0, 10.0}, "m",
@@ -78,6 +82,7 @@ class Subsampling {
     int rows_of(const Frame& frame) const;
     void collect_row(const Frame& frame, int row);
     void thin_out();
+    int raw_points() const;
     void select(Frame& frame);
     template <class Candidate>
     void sort_by_firing(const std::vector<Candidate>& candidates);
