@@ -46,7 +46,7 @@ void FramedOpenings::take_back(const Frame& frame, std::span<const std::uint8_t>
     const auto column_of = [&](PixelIndex pixel) { return static_cast<int>(pixel % width) / kTileColumns; };
     for (const PixelIndex pixel : evidence.tested()) {
         const std::size_t segment = frame.prepared.segment[pixel] - 1;
-        if (evidence[pixel] != Evidence::kOccupied || compact[segment] != 0) continue;
+        if (!is_occupied(evidence[pixel]) || compact[segment] != 0) continue;
         if (!frame.prepared.segments[segment].feasible) continue;
         Tile& tile = tiles_(row_of(pixel), column_of(pixel));
         const float range_m = frame.cloud.range_m[pixel];
@@ -59,8 +59,10 @@ void FramedOpenings::take_back(const Frame& frame, std::span<const std::uint8_t>
         const int column = column_of(pixel);
         const float range_m = frame.cloud.range_m[pixel];
         const float reach_rad = static_cast<float>(config_.reach_m) / std::max(0.5F, range_m);
-        const int rows = std::max(1, static_cast<int>(reach_rad / tile_height_rad_));
-        const int columns = std::clamp(static_cast<int>(reach_rad / tile_width_rad_), 1, tiles_.width() / 4);
+        const int rows = static_cast<int>(reach_rad / tile_height_rad_);
+        const int columns = std::min(static_cast<int>(reach_rad / tile_width_rad_), tiles_.width() / 4);
+        // Too far off for a window to be told from what stands beside it.
+        if (rows < 1 || columns < 1) continue;
         const float nearest_m = range_m - static_cast<float>(config_.depth_m);
         const float farthest_m = range_m + static_cast<float>(config_.tolerance_m);
         const float top_m = range_m + static_cast<float>(config_.slant_m);
