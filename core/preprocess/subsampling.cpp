@@ -1,6 +1,5 @@
 #include "core/preprocess/subsampling.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -176,20 +175,6 @@ void Subsampling::thin_out() {
     });
 }
 
-/// How many raw points take part.
-int Subsampling::raw_points() const {
-    const int available = static_cast<int>(rough_.size());
-    Eigen::Matrix3f facing = Eigen::Matrix3f::Zero();
-    for (const Flat& c : flat_) {
-        const Eigen::Vector3f n(c.nx, c.ny, c.nz);
-        facing += n * n.transpose();
-    }
-    // The direction that is seen worst: so many points would face it squarely.
-    const float least = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f>(facing, Eigen::EigenvaluesOnly).eigenvalues()[0];
-    if (least < static_cast<float>(config_.least_facing)) return available;
-    return std::clamp(config_.least_points - static_cast<int>(flat_.size()), 0, available);
-}
-
 void Subsampling::select(Frame& frame) {
     thin_out();
     PointSelection& points = frame.prepared.points;
@@ -229,7 +214,7 @@ void Subsampling::select(Frame& frame) {
     }
     sort_by_firing(rough_);
     const int available = static_cast<int>(rough_.size());
-    const int wanted = raw_points();
+    const int wanted = std::clamp(config_.least_points - static_cast<int>(flat_.size()), 0, available);
     int credit = 0;
     for (const std::uint32_t i : order_) {
         const Rough& c = rough_[i];

@@ -13,8 +13,7 @@ struct SubsamplingConfig {
     int column_step = 4;
     int rough_step = 1;
     int points = 3000;
-    int least_points = 2000;
-    int least_facing = 40;
+    int least_points = 3000;
     double spacing_m = 0.12;
     double min_range_m = 0.5;
     double crop_box_m = 0.5;
@@ -32,11 +31,10 @@ struct SubsamplingConfig {
                     "every n-th candidate of what is not flat; lower sees smaller moving objects");
         v.parameter("points", points, Range{200, 50000}, "points",
                     "flat points kept, evened out over the directions of their normals");
-        v.parameter("least_points", least_points, Range{0, 50000}, "points",
-                    "with fewer flat points raw ones make up for them: many columns lost, or nothing flat");
-        v.parameter("least_facing", least_facing, Range{0, 50000}, "points",
-                    "with fewer flat points that face some direction all raw ones take part: between trees and bushes "
-                    "the ground is all that is flat");
+        v.parameter(
+            "least_points", least_points, Range{0, 50000}, "points",
+            "with fewer flat points raw ones make up for them: many columns lost, or trees and bushes, between which "
+            "the ground is all that is flat");
         v.parameter("spacing_m", spacing_m, Range{0.0, 5.0}, "m",
                     "near surfaces are thinned to about this spacing along a row");
         v.parameter("min_range_m", min_range_m, Range{0.0, 10.0}, "m",
@@ -82,7 +80,6 @@ class Subsampling {
     int rows_of(const Frame& frame) const;
     void collect_row(const Frame& frame, int row);
     void thin_out();
-    int raw_points() const;
     void select(Frame& frame);
     template <class Candidate>
     void sort_by_firing(const std::vector<Candidate>& candidates);

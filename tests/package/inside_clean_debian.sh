@@ -17,7 +17,7 @@ dlod --version
 dlod check-config /etc/dlod/dlod.yaml
 
 say "simulate and replay"
-dlod-sim square --sensor OS0-32 --mode 512x10 --frames 6 --out /root/drive
+dlod-sim square --seed 3 --sensor OS0-32 --mode 512x10 --frames 6 --out /root/drive
 dlod replay /root/drive/square.pcap --out /root/run --threads 2
 # One line of header; a frame whose end the capture does not show may be missing.
 frames=$(($(wc -l </root/run/frames.csv) - 1))

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <map>
 #include <numbers>
-#include <random>
 #include <set>
 #include <tuple>
 
@@ -289,34 +288,6 @@ TEST(Subsampling, RawPointsTakePartOnlyWhereFlatOnesAreFew) {
     }
     config.least_points = static_cast<int>(flat) + 100;
     EXPECT_EQ(taking_part(), 100);
-}
-
-TEST(Subsampling, RawPointsTakePartWhereADirectionIsFacedByFewFlatOnes) {
-    // A plain, and bushes: what is not ground has no window that is flat.
-    std::vector<SceneBox> plain = {{{-80.0, -80.0, -1.2}, {80.0, 80.0, -1.0}}};
-    std::mt19937 random(4);
-    std::uniform_real_distribution<double> place(-0.8, 0.8);
-    for (int k = 0; k < 12; ++k) {
-        const Eigen::Vector3d bush(6.0 * std::cos(0.5 * k), 6.0 * std::sin(0.5 * k), 0.0);
-        for (int i = 0; i < 60; ++i) {
-            const Eigen::Vector3d twig = bush + Eigen::Vector3d(place(random), place(random), place(random));
-            plain.push_back({twig, twig + Eigen::Vector3d::Constant(0.06)});
-        }
-    }
-    Room room(resolution(64, 1024), plain);
-    SubsamplingConfig config;
-    config.least_points = 0;
-    const auto raw = [&] {
-        int count = 0;
-        const PointSelection& points = room.select(config);
-        for (std::size_t i = 0; i < points.size(); ++i) {
-            count += normal(points, i).isZero() && points.planarity[i] > 0.0F ? 1 : 0;
-        }
-        return count;
-    };
-    EXPECT_GT(raw(), 200);
-    config.least_facing = 0;
-    EXPECT_EQ(raw(), 0);
 }
 
 TEST(Subsampling, WherePacketsAreLostOtherRowsAndPartsOfWindowsMakeUpForThem) {
