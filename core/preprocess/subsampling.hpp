@@ -13,7 +13,7 @@ struct SubsamplingConfig {
     int column_step = 4;
     int rough_step = 1;
     int points = 3000;
-    int least_points = 3000;
+    int least_points = 2500;
     double spacing_m = 0.12;
     double min_range_m = 0.5;
     double crop_box_m = 0.5;
