@@ -19,7 +19,7 @@ constexpr int kRivalPacketsToBelieve = 64;
 /// So long after a restart packets of before it are taken for stragglers.
 constexpr int kRetiredPackets = 64;
 /// Beyond this a jump of frame ids says nothing about the number of frames lost.
-constexpr std::int32_t kMaximumLostFrames = 1000;
+constexpr std::int64_t kMaximumLostFrames = 1000;
 /// Frames whose start is further from the sensor's rate, in turns, show a jump of its clock.
 constexpr double kClockJump_turns = 0.5;
 
@@ -192,7 +192,7 @@ void FrameBuilder::suspect(const LidarPacket& packet) {
         ++counters_.duplicate_packets;
         return;
     }
-    if (same_sensor && std::abs(distance) <= 1) {
+    if (same_sensor && distance >= -1 && distance <= 1) {
         suspect_present_ = false;
         start_at(distance >= 0 ? suspect_.header.frame_id : packet.header.frame_id, packet.header.init_id);
         read_columns(suspect_);
@@ -213,7 +213,7 @@ void FrameBuilder::start_at(std::uint32_t frame_id, std::uint32_t init_id) {
     const bool restarted = init_id != init_id_;
     if (started_) {
         ++(restarted ? counters_.restarts : counters_.frame_id_jumps);
-        std::int32_t lost = restarted ? 0 : info_.format->frame_distance(frame_id_, frame_id);
+        std::int64_t lost = restarted ? 0 : info_.format->frame_distance(frame_id_, frame_id);
         for (Slot& slot : slots_) {
             if (slot.packets == 0) continue;
             close(slot);
@@ -315,6 +315,7 @@ void FrameBuilder::close(Slot& slot) {
     count_lost_packets(slot);
     if (slot.dropped) {
         ++counters_.dropped_frames;
+        ++sequence_;
     } else {
         finish(*slot.frame, slot, &slot == slots_.data() ? frame_id_ : frame_id_ + 1);
         emit_(slot.frame);

@@ -133,8 +133,8 @@ class FrameBuilder {
     std::vector<ColumnHeader> headers_;         ///< of the packet at hand
     std::array<Slot, 2> slots_;                 ///< the frame frame_id_ and the one after it
     std::vector<std::uint8_t> closed_columns_;  ///< ColumnState of the frame before them
-    std::uint64_t sequence_ = 0;
-    std::int64_t last_stamp_ns_ = 0;  ///< of the frame emitted last
+    std::uint64_t sequence_ = 0;                ///< of the next frame: those that are dropped count, too
+    std::int64_t last_stamp_ns_ = 0;            ///< of the frame emitted last
 
     bool started_ = false;
     bool joined_in_turn_ = true;  ///< no frame closed since the start: what is missing at its beginning was not lost

@@ -5,6 +5,8 @@
 #include <cstring>
 #include <numbers>
 
+#include "driver/column_clock.hpp"
+
 namespace dlod::driver {
 namespace {
 
@@ -37,7 +39,8 @@ std::optional<ImuSample> decode_imu_packet(std::span<const std::byte> packet) {
     if (!plausible(acceleration_g, kMaximumAcceleration_g)) return std::nullopt;
     if (!plausible(angular_velocity_dps, kMaximumAngularVelocity_dps)) return std::nullopt;
     ImuSample sample;
-    sample.stamp_ns = static_cast<std::int64_t>(time);
+    sample.stamp_ns = ColumnClock::to_time(time);
+    if (sample.stamp_ns < 0) return std::nullopt;
     sample.acceleration_mps2 = (acceleration_g.cast<double>() * kGravity_mps2).cast<float>();
     sample.angular_velocity_radps = (angular_velocity_dps.cast<double>() * kRadiansPerDegree).cast<float>();
     return sample;

@@ -16,7 +16,8 @@ inline constexpr std::string_view kLegacyImuProfile = "LEGACY";
 inline constexpr std::size_t kLegacyImuPacketBytes = 48;
 
 /// The sample in a LEGACY IMU packet of kLegacyImuPacketBytes; its stamp is that of the gyroscope. Nothing where a
-/// value is not finite or beyond what such an IMU can measure (50 g, 5000 deg/s).
+/// value is not finite or beyond what such an IMU can measure (50 g, 5000 deg/s), or the time is none
+/// (ColumnClock::to_time).
 std::optional<ImuSample> decode_imu_packet(std::span<const std::byte> packet);
 
 /// Writes a LEGACY IMU packet of kLegacyImuPacketBytes whose accelerometer and gyroscope times are the sample's stamp.

@@ -124,6 +124,25 @@ TEST(FrameBuilder, GarbageHeadersCloseNoGoodFrame) {
     expect_clean_frames(bench, 102);
 }
 
+TEST(FrameBuilder, FrameIdsAsFarApartAsCanBe) {
+    const SyntheticSensor sensor({.profile = "FUSA_RNG15_RFL8_NIR8_DUAL"});
+    BuilderBench bench(sensor);
+    constexpr std::uint32_t kHalf = std::uint32_t{1} << 31U;
+    bench.push_frame(100);
+    bench.push_frame(101, 0, 16);
+    for (const std::uint32_t far : {7'000'000U, 7'000'000U + kHalf, 7'000'000U}) bench.push(sensor.packet(far, 3));
+    EXPECT_EQ(bench.emitted.size(), 1U) << "none of them confirms another";
+    EXPECT_EQ(bench.counters().implausible_packets.value(), 2U);
+    bench.push_frame(101, 16);
+    bench.push_frame(102, 0, 4);
+    bench.push(sensor.packet(102 + kHalf, 0));
+    bench.push(sensor.packet(102 + kHalf, 1));
+    EXPECT_EQ(bench.counters().frame_id_jumps.value(), 1U) << "two confirm each other";
+    EXPECT_EQ(bench.counters().lost_frames.value(), 0U);
+    bench.push_frame(102 + kHalf, 2);
+    expect_clean_frames(bench, 103 + kHalf);
+}
+
 TEST(FrameBuilder, WrongSizesAndTypesAreCounted) {
     const SyntheticSensor sensor;
     BuilderBench bench(sensor);

@@ -58,6 +58,22 @@ TEST(Imu, WhatNoImuMeasuresIsRefused) {
     }
 }
 
+TEST(Imu, TimesThatNoClockShowsAreRefused) {
+    constexpr std::int64_t kNoTime = std::int64_t{1} << 62U;
+    for (const std::int64_t bad : {std::numeric_limits<std::int64_t>::min(), std::int64_t{-1}, kNoTime,
+                                   std::numeric_limits<std::int64_t>::max()}) {
+        std::vector<std::byte> bytes(kLegacyImuPacketBytes);
+        encode_imu_packet(bytes, {.stamp_ns = bad}, 0);
+        EXPECT_FALSE(decode_imu_packet(bytes)) << bad;
+    }
+    for (const std::int64_t good : {std::int64_t{0}, kNoTime - 1}) {
+        std::vector<std::byte> bytes(kLegacyImuPacketBytes);
+        encode_imu_packet(bytes, {.stamp_ns = good}, 0);
+        ASSERT_TRUE(decode_imu_packet(bytes)) << good;
+        EXPECT_EQ(decode_imu_packet(bytes)->stamp_ns, good);
+    }
+}
+
 ImuSample at(std::int64_t stamp_ns) {
     ImuSample sample;
     sample.stamp_ns = stamp_ns;
