@@ -32,6 +32,7 @@ LcmBus::~LcmBus() {
 }
 
 bool LcmBus::publish(const std::string& channel, std::span<const std::byte> message) {
+    const std::lock_guard lock(sending_);
     return ::lcm_publish(lcm_, channel.c_str(), message.data(), static_cast<unsigned>(message.size())) == 0;
 }
 

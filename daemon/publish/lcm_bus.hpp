@@ -1,5 +1,6 @@
 #pragma once
 
+#include <mutex>
 #include <stdexcept>
 #include <string>
 
@@ -33,6 +34,7 @@ class LcmBus final : public MessageBus {
 
   private:
     _lcm_t* lcm_ = nullptr;
+    std::mutex sending_;  ///< of LCM's providers only multicast takes care that messages of several threads do not mix
 };
 
 }  // namespace dlod::daemon
