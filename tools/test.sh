@@ -40,7 +40,8 @@ sanitize() {
 }
 for sanitizer in "${sanitizers[@]}"; do
     case $sanitizer in
-        thread) sanitize thread thread OFF "test_daemon_pipeline test_daemon_live" '^daemon_(pipeline|live)/' ;;
+        thread) sanitize thread thread OFF "test_daemon_pipeline test_daemon_publish test_daemon_live" \
+            '^daemon_(pipeline|publish|live)/' ;;
         address) sanitize address address,undefined ON "tests_core tests_driver tests_daemon tests_tools" '/' ;;
     esac
 done

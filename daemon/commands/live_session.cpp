@@ -28,7 +28,8 @@ PipelineOptions pipeline_options(const Config& config) {
 std::unique_ptr<SessionMessages> make_messages(const Config& config, const driver::SensorInfo& sensor) {
     if (config.lcm.url == "none") return nullptr;
     return std::make_unique<SessionMessages>(config.lcm, sensor, config.method.odometry.motion,
-                                             config.extrinsics.T_base_sensor());
+                                             config.extrinsics.T_base_sensor(),
+                                             [pipeline = config.pipeline] { set_up_thread("dlod-predict", pipeline); });
 }
 
 /// No packet for so long: the sensor is asked why.

@@ -118,6 +118,7 @@ ExitCode replay(const ReplayArguments& arguments) {
         writer = std::make_unique<ResultWriter>(config.output.folder, static_cast<TimingClock>(config.output.timing));
     }
 
+    SignalWaiter signals;  // before any thread
     std::unique_ptr<ReplayMessages> messages;
     if (!config.lcm.url.empty() && config.lcm.url != "none") {
         messages = std::make_unique<ReplayMessages>(config, sensor);
@@ -135,7 +136,6 @@ ExitCode replay(const ReplayArguments& arguments) {
         summary.add(frame);
         if (messages) messages->add(frame);
     };
-    SignalWaiter signals;
     const auto start = Clock::now();
     const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
     Pipeline pipeline(sensor, config.method, config.frames, source, std::move(sinks),

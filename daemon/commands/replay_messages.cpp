@@ -16,7 +16,7 @@ std::int64_t monotonic_ns() {
 ReplayMessages::ReplayMessages(const Config& config, const driver::SensorInfo& sensor)
     : config_(config.lcm),
       maps_(config.saved_maps),
-      messages_(config.lcm, sensor, config.method.odometry.motion, config.extrinsics.T_base_sensor()),
+      messages_(config.lcm, sensor, config.method.odometry.motion, config.extrinsics.T_base_sensor(), nullptr),
       board_(DLOD_VERSION, sensor.description(), monotonic_ns()) {}
 
 void ReplayMessages::add(const PipelineFrame& frame) {

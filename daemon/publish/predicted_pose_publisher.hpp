@@ -20,7 +20,7 @@ class PredictedPosePublisher {
 
     /// The pose to go on from. On the thread of poses. @param utime of the frame's messages [us]
     void see(const Frame& frame, std::int64_t utime);
-    /// On the thread that receives, which may be another one.
+    /// On one thread, which may be another one.
     void publish(const ImuSample& sample);
 
     /// Messages that could not be sent; from any thread.
@@ -41,7 +41,7 @@ class PredictedPosePublisher {
     std::string channel_;
     int every_;
     LatestValue<Start> newest_;
-    // Of the thread that receives.
+    // Of the thread that publishes.
     ImuPrediction prediction_;
     Start start_;
     int readings_ = 0;               ///< since the last message
