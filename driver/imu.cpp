@@ -18,7 +18,6 @@ constexpr std::size_t kGyroscopeTime = 16;
 constexpr std::size_t kAcceleration = 24;
 constexpr std::size_t kAngularVelocity = 36;
 
-constexpr double kGravity_mps2 = 9.80665;
 constexpr double kRadiansPerDegree = std::numbers::pi / 180.0;
 constexpr float kMaximumAcceleration_g = 50.0F;
 constexpr float kMaximumAngularVelocity_dps = 5000.0F;
@@ -41,13 +40,14 @@ std::optional<ImuSample> decode_imu_packet(std::span<const std::byte> packet) {
     ImuSample sample;
     sample.stamp_ns = ColumnClock::to_time(time);
     if (sample.stamp_ns < 0) return std::nullopt;
-    sample.acceleration_mps2 = (acceleration_g.cast<double>() * kGravity_mps2).cast<float>();
+    sample.acceleration_mps2 = (acceleration_g.cast<double>() * kStandardGravity_mps2).cast<float>();
     sample.angular_velocity_radps = (angular_velocity_dps.cast<double>() * kRadiansPerDegree).cast<float>();
     return sample;
 }
 
 void encode_imu_packet(std::span<std::byte> packet, const ImuSample& sample, std::int64_t system_time_ns) {
-    const Eigen::Vector3f acceleration_g = (sample.acceleration_mps2.cast<double>() / kGravity_mps2).cast<float>();
+    const Eigen::Vector3f acceleration_g =
+        (sample.acceleration_mps2.cast<double>() / kStandardGravity_mps2).cast<float>();
     const Eigen::Vector3f angular_velocity_dps =
         (sample.angular_velocity_radps.cast<double>() / kRadiansPerDegree).cast<float>();
     std::memcpy(packet.data() + kSystemTime, &system_time_ns, sizeof(system_time_ns));

@@ -88,20 +88,18 @@ void EvidenceImage::sort_into_blocks(const OdometryResult& odometry) {
 }
 
 EvidenceImage::Counts EvidenceImage::count(std::span<const PixelIndex> pixels) const {
-    // Three counters side by side in one word: an image has fewer than two million pixels.
+    // What an image can hold of them fits side by side in one word, but for the edges, which are few: counted apart.
     constexpr int kBits = 21;
-    constexpr std::uint64_t kOne = 1, kMask = (kOne << kBits) - 1;
-    constexpr std::array<std::uint64_t, 5> kAdd{0, kOne, kOne << kBits, kOne << (2 * kBits), 0};
-    static_assert(static_cast<int>(Evidence::kUnknown) == 1 && static_cast<int>(Evidence::kFree) == 2 &&
-                  static_cast<int>(Evidence::kOccupied) == 3 && static_cast<int>(Evidence::kEdge) == 4);
+    constexpr std::uint64_t kUnknown = 1, kFree = kUnknown << kBits, kOccupied = kFree << kBits, kMask = kFree - 1;
+    constexpr std::array<std::uint64_t, 5> kAdd{0, kUnknown, kFree, kOccupied, kOccupied};  // by Evidence
     std::uint64_t sum = 0;
     int edges = 0;
     for (const PixelIndex pixel : pixels) {
         sum += kAdd[image_[pixel]];
-        edges += image_[pixel] >> 2U;
+        edges += (*this)[pixel] == Evidence::kEdge ? 1 : 0;
     }
-    return {static_cast<int>(sum >> kBits & kMask), static_cast<int>(sum >> (2 * kBits)) + edges,
-            static_cast<int>(sum & kMask), edges};
+    return {static_cast<int>(sum >> kBits & kMask), static_cast<int>(sum >> (2 * kBits)), static_cast<int>(sum & kMask),
+            edges};
 }
 
 void EvidenceImage::run(const Frame& frame) {

@@ -2,22 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace dlod {
 namespace {
 
-constexpr float kLeastRow_rad = 1e-3F;  // no sensor's rows are closer
+constexpr double kLeastRow_rad = 1e-3;  // no sensor's rows are closer
 
 }  // namespace
 
 FramedOpenings::FramedOpenings(const SensorModel& sensor, const FramedOpeningsConfig& config)
     : config_(config),
       tiles_((sensor.height + kTileRows - 1) / kTileRows, (sensor.width + kTileColumns - 1) / kTileColumns),
-      tile_height_rad_(std::max(kLeastRow_rad, std::abs(sensor.altitude_rad.front() - sensor.altitude_rad.back()) /
-                                                   static_cast<float>(std::max(1, sensor.height - 1))) *
-                       kTileRows),
-      tile_width_rad_(static_cast<float>(kTileColumns * 2.0 * std::numbers::pi / sensor.width)) {}
+      tile_height_rad_(static_cast<float>(kTileRows * std::max(kLeastRow_rad, sensor.row_rad()))),
+      tile_width_rad_(static_cast<float>(kTileColumns * sensor.column_rad())) {}
 
 void FramedOpenings::begin() {
     tiles_.fill({});

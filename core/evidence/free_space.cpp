@@ -150,7 +150,7 @@ FreeSpace::FreeSpace(const SensorModel& sensor, const FreeSpaceConfig& config, i
       wide_bits_(wide_bits) {
     late_.assign(sensor.pixels(), 0);
     double columns = 0.0;
-    const double column_rad = 2.0 * std::numbers::pi / sensor.width;
+    const double column_rad = sensor.column_rad();
     for (int r = 0; r < sensor.height; ++r) {
         const auto row = static_cast<std::size_t>(r);
         max_shift_ = std::max(max_shift_, sensor.pixel_shift[row]);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 namespace dlod {
 namespace {
@@ -30,9 +29,8 @@ MovingParts::MovingParts(const SensorModel& sensor, const MovingPartsConfig& con
 }
 
 void MovingParts::request_around(const Frame& frame, const Segment& segment, EvidenceImage& evidence) const {
-    const double column_rad = 2.0 * std::numbers::pi / sensor_.width;
-    const double row_rad = std::abs(static_cast<double>(sensor_.altitude_rad.front() - sensor_.altitude_rad.back())) /
-                           std::max(1, sensor_.height - 1);
+    const double column_rad = sensor_.column_rad();
+    const double row_rad = sensor_.row_rad();
     const std::uint32_t label = frame.prepared.segment[frame.prepared.pixels[segment.first]];
     const int width = sensor_.width;
     struct Window {

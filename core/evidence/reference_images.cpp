@@ -108,7 +108,7 @@ ReferenceImages::ReferenceImages(const SensorModel& sensor, int levels)
       users_(pool_.size(), 0),
       slots_(2 * static_cast<std::size_t>(levels), -1),
       units_(kRowsHigh, sensor.width) {
-    const double column_rad = 2.0 * std::numbers::pi / sensor.width;
+    const double column_rad = sensor.column_rad();
     while (sensor.width % (2 << narrow_bits_) == 0 && (2 << narrow_bits_) * column_rad < 1.5 * kNarrowCell_rad)
         ++narrow_bits_;
     wide_bits_ = narrow_bits_;

@@ -7,8 +7,6 @@
 
 namespace dlod {
 
-inline constexpr double kStandardGravity_mps2 = 9.80665;
-
 /// The rotation that turns this direction of the sensor's frame upwards, and its x axis to yaw 0.
 Eigen::Matrix3d levelled(const Eigen::Vector3d& up);
 

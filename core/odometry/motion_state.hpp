@@ -14,7 +14,7 @@ struct MotionState {
     Eigen::Vector3d rate_radps =
         Eigen::Vector3d::Zero();  ///< body: bias of the gyroscope, or without IMU the angular velocity
     Eigen::Vector3d accelerometer_bias_mps2 = Eigen::Vector3d::Zero();
-    Eigen::Vector3d gravity_mps2 = Eigen::Vector3d(0.0, 0.0, -9.80665);
+    Eigen::Vector3d gravity_mps2 = Eigen::Vector3d(0.0, 0.0, -kStandardGravity_mps2);
 };
 
 /// Moves the state by dt, which may be negative, at a constant turn rate (body) and acceleration (world).

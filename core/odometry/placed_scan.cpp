@@ -66,9 +66,7 @@ std::size_t PlacedScan::candidates() const {
 
 std::size_t PlacedScan::flat_points() const {
     std::size_t flat = 0;
-    for (std::size_t i = 0; i < points_->size(); ++i) {
-        flat += points_->nx[i] != 0.0F || points_->ny[i] != 0.0F || points_->nz[i] != 0.0F ? 1 : 0;
-    }
+    for (std::size_t i = 0; i < points_->size(); ++i) flat += points_->is_flat(i) ? 1 : 0;
     return flat;
 }
 

@@ -22,10 +22,6 @@ constexpr double kMaxDeviation_m = 1e-3;
 constexpr double kMoved_m = 3e-3;
 constexpr double kTurned_rad = 3e-4;
 
-bool is_flat(const PointSelection& points, std::size_t i) {
-    return points.nx[i] != 0.0F || points.ny[i] != 0.0F || points.nz[i] != 0.0F;
-}
-
 }  // namespace
 
 Standstill::Standstill(const SensorModel& sensor) : by_pixel_(sensor.pixels(), 0) {}
@@ -42,7 +38,7 @@ bool Standstill::shows_no_motion(const PointSelection& points) {
     matches_.reserve(points.pixel.capacity());
     matches_.clear();
     std::size_t near = 0;
-    for (std::size_t i = 0; i < points.size() && is_flat(points, i); ++i) {
+    for (std::size_t i = 0; i < points.size() && points.is_flat(i); ++i) {
         const std::uint32_t number = by_pixel_[points.pixel[i]];
         if (number == 0) continue;
         const Surface& before = surfaces_[number - 1];
@@ -77,7 +73,7 @@ void Standstill::begin(const PointSelection& points) {
     pixels_.reserve(points.pixel.capacity());
     surfaces_.clear();
     pixels_.clear();
-    for (std::size_t i = 0; i < points.size() && is_flat(points, i); ++i) {
+    for (std::size_t i = 0; i < points.size() && points.is_flat(i); ++i) {
         surfaces_.push_back({{points.x[i], points.y[i], points.z[i]}, {points.nx[i], points.ny[i], points.nz[i]}});
         pixels_.push_back(points.pixel[i]);
         by_pixel_[points.pixel[i]] = static_cast<std::uint32_t>(surfaces_.size());

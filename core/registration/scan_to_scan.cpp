@@ -67,9 +67,7 @@ void ScanToScan::match(const PointSelection& points, std::span<const std::uint8_
     const Eigen::Matrix3f R_local_target = T_target_local.linear().transpose();
     // Flat points come first; the raw ones that make up for them have no normal to compare.
     std::size_t count = excluded.size();
-    while (count > 0 && points.nx[count - 1] == 0.0F && points.ny[count - 1] == 0.0F && points.nz[count - 1] == 0.0F) {
-        --count;
-    }
+    while (count > 0 && !points.is_flat(count - 1)) --count;
     const std::size_t step = std::max<std::size_t>(1, count / static_cast<std::size_t>(config_.points));
     for (std::size_t i = 0; i < count; i += step) {
         if (points.planarity[i] <= 0.0F || excluded[i]) continue;

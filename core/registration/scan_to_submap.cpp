@@ -84,11 +84,11 @@ void ScanToSubmap::match(const PointSelection& points, std::span<const std::uint
         if (points.planarity[i] <= 0.0F || excluded[i]) continue;
         const float q[3] = {placed.x[i], placed.y[i], placed.z[i]};
         const Cell cell = cell_of(q, origin, side, inverse_side);
-        const bool raw = points.nx[i] == 0.0F && points.ny[i] == 0.0F && points.nz[i] == 0.0F;
+        const bool flat = points.is_flat(i);
         const float normal[3] = {placed.nx[i], placed.ny[i], placed.nz[i]};
         const VoxelPlane* plane = map.find(cell.index);
         // A voxel that is not flat as a whole, or not as the point is, may have a facet that faces as the point does.
-        if (!raw && plane != nullptr && (!plane->flat || std::abs(dot(normal, plane->normal)) < min_cosine)) {
+        if (flat && plane != nullptr && (!plane->flat || std::abs(dot(normal, plane->normal)) < min_cosine)) {
             plane = map.find_facet(cell.index, normal);
         }
         if (plane == nullptr || !plane->flat) continue;
@@ -96,7 +96,7 @@ void ScanToSubmap::match(const PointSelection& points, std::span<const std::uint
                             cell.offset[2] - plane->mean[2]};
         const float residual = dot(d, plane->normal);
         if (std::abs(residual) > gate) continue;
-        if (!raw && std::abs(dot(normal, plane->normal)) < min_cosine) continue;
+        if (flat && std::abs(dot(normal, plane->normal)) < min_cosine) continue;
         const float fall = 1.0F / (1.0F + residual * residual * inverse_kernel2);
         const float weight = points.planarity[i] * fall * fall / (plane->thickness_m * plane->thickness_m);
         const float lever[3] = {placed.lx[i], placed.ly[i], placed.lz[i]};

@@ -80,7 +80,7 @@ float RangeImageSegmentation::Bounds::length() const {
 RangeImageSegmentation::RangeImageSegmentation(const SensorModel& sensor, const SegmentationConfig& config)
     : sensor_(sensor),
       config_(config),
-      ratio_right_(ratio_of(2.0 * std::numbers::pi / sensor.width, config.angle_threshold_rad)),
+      ratio_right_(ratio_of(sensor.column_rad(), config.angle_threshold_rad)),
       links_(sensor.width) {
     ratio_down_.push_back(1.0F);  // there is no row above the first
     for (std::size_t r = 1; r < static_cast<std::size_t>(sensor.height); ++r) {

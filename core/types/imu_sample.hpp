@@ -1,10 +1,11 @@
 #pragma once
 
 #include <Eigen/Core>
-
 #include <cstdint>
 
 namespace dlod {
+
+inline constexpr double kStandardGravity_mps2 = 9.80665;
 
 /// One reading of the sensor's IMU, in the IMU frame (SensorModel::T_sensor_imu turns it into the sensor's).
 struct ImuSample {

@@ -6,7 +6,6 @@
 namespace dlod::tools::sim {
 namespace {
 
-constexpr double kGravity_mps2 = 9.80665;
 constexpr double kAccelerationNoise_mps2 = 0.03;
 constexpr double kGyroscopeNoise_radps = 0.003;
 constexpr std::uint64_t kStream = 0x1A0;
@@ -32,7 +31,7 @@ ImuReading ImuSimulator::truth(double t) const {
     const Vec3 acceleration =
         (before.translation() - 2.0 * now.translation() + after.translation()) / (kStep_s * kStep_s);
     ImuReading reading;
-    reading.acceleration_mps2 = now.linear().transpose() * (acceleration + Vec3(0.0, 0.0, kGravity_mps2));
+    reading.acceleration_mps2 = now.linear().transpose() * (acceleration + Vec3(0.0, 0.0, kStandardGravity_mps2));
     const Eigen::Matrix3d turn = before.linear().transpose() * after.linear();
     reading.angular_velocity_radps = so3_log(Eigen::Quaterniond(turn)) / (2.0 * kStep_s);
     return reading;
