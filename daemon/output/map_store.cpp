@@ -1,9 +1,13 @@
 #include "daemon/output/map_store.hpp"
 
+#include <fcntl.h>
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdlib>
 #include <ctime>
 #include <fstream>
@@ -55,6 +59,33 @@ std::string checksum_in(const std::filesystem::path& path) {
     return at == std::string::npos ? "" : header.substr(at, kChecksum.size() + 16);
 }
 
+/// NAME.pcd.part or NAME.ply.part: what is being saved, or was.
+bool is_part_of_map(std::filesystem::path path) {
+    if (path.extension() != OutputFile::kPartSuffix) return false;
+    path = path.stem();
+    return (path.extension() == ".pcd" || path.extension() == ".ply") && is_map_name(path.stem().string());
+}
+
+/// Tells programs that save into a folder (LOCK_SH) from one that tidies it up (LOCK_EX). A kill lets go of it.
+class FolderLock {
+  public:
+    FolderLock(const std::filesystem::path& folder, int operation)
+        : descriptor_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)),
+          refused_(descriptor_ >= 0 && ::flock(descriptor_, operation) != 0 && errno == EWOULDBLOCK) {}
+    ~FolderLock() {
+        if (descriptor_ >= 0) ::close(descriptor_);
+    }
+    FolderLock(const FolderLock&) = delete;
+    FolderLock& operator=(const FolderLock&) = delete;
+
+    /// Another program has it. Where the file system knows no locks, nobody is taken to be there.
+    bool is_refused() const { return refused_; }
+
+  private:
+    int descriptor_;
+    bool refused_;
+};
+
 }  // namespace
 
 bool is_map_name(std::string_view name) {
@@ -63,22 +94,33 @@ bool is_map_name(std::string_view name) {
 }
 
 MapStore::MapStore(const MapStoreConfig& config) : folder_(folder_of(config)), most_(config.most) {
-    complete_pairs();
+    tidy_up();
 }
 
 /// Where a PCD has been replaced, and the PLY of the same points waits beside the old one, the kill came in between.
-void MapStore::complete_pairs() const {
+/// What else waits will never be complete.
+void MapStore::tidy_up() const {
+    const FolderLock lock(folder_, LOCK_EX | LOCK_NB);
+    if (lock.is_refused()) return;  // somebody is saving
     // A folder that cannot be used is named when a map is to be saved.
     std::error_code error;
+    std::vector<std::filesystem::path> left_behind;
     for (std::filesystem::directory_iterator entry(folder_, error), end; !error && entry != end;
          entry.increment(error)) {
-        auto ply = entry->path();
-        if (ply.extension() != OutputFile::kPartSuffix || ply.replace_extension().extension() != ".ply") continue;
-        auto pcd = ply;
+        if (is_part_of_map(entry->path())) left_behind.push_back(entry->path());
+    }
+    for (const auto& part : left_behind) {
+        auto target = part;
+        target.replace_extension();
+        auto pcd = target;
         pcd.replace_extension(".pcd");
-        const std::string waiting = checksum_in(entry->path());
+        const std::string waiting = target.extension() == ".ply" ? checksum_in(part) : "";
         std::error_code failure;
-        if (!waiting.empty() && waiting == checksum_in(pcd)) std::filesystem::rename(entry->path(), ply, failure);
+        if (!waiting.empty() && waiting == checksum_in(pcd)) {
+            std::filesystem::rename(part, target, failure);
+        } else {
+            std::filesystem::remove(part, failure);
+        }
     }
 }
 
@@ -100,6 +142,8 @@ MapStore::Result MapStore::save(std::string name, std::vector<CellTable::Entry> 
     const auto path = folder_ / name;
     try {
         std::filesystem::create_directories(folder_);
+        tidy_up();
+        const FolderLock lock(folder_, LOCK_SH);
         if (is_full(name)) {
             return {false, fmt::format("{}: holds {} maps already: remove some, or raise saved_maps.most",
                                        folder_.string(), most_)};
@@ -110,7 +154,7 @@ MapStore::Result MapStore::save(std::string name, std::vector<CellTable::Entry> 
         const std::string comment = checksum_comment(map);
         write_pcd(pcd, map, comment);
         write_ply(ply, map, comment);
-        // What can fail has not failed before either is replaced: they stay a pair. The PCD goes first: complete_pairs.
+        // What can fail has not failed before either is replaced: they stay a pair. The PCD goes first: tidy_up.
         pcd.finish();
         ply.finish();
         pcd.close();

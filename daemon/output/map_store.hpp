@@ -35,10 +35,11 @@ bool is_map_name(std::string_view name);
 
 /// Keeps maps in one folder, NAME.pcd and NAME.ply each. Two files cannot be replaced at one instant: where the program
 /// is killed between the two, the next one puts the second in place. Until then a reader can tell by the checksum of
-/// the points, a comment "map 0123456789abcdef" in the header of either file. For one thread.
+/// the points, a comment "map 0123456789abcdef" in the header of either file. Several programs may have one folder. For
+/// one thread.
 class MapStore {
   public:
-    /// Completes what a kill has left undone.
+    /// Completes or removes what a kill has left undone; so does every save.
     /// @param config its folder, or where that is empty and the service has a state directory, a folder in that
     explicit MapStore(const MapStoreConfig& config);
 
@@ -52,7 +53,7 @@ class MapStore {
 
   private:
     bool is_full(const std::string& name) const;
-    void complete_pairs() const;
+    void tidy_up() const;
 
     std::filesystem::path folder_;
     int most_;

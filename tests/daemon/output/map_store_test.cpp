@@ -1,7 +1,10 @@
 #include "daemon/output/map_store.hpp"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <cstdlib>
@@ -164,6 +167,32 @@ TEST(MapStore, AKillBetweenTheTwoIsMadeGoodByTheNextProgram) {
     EXPECT_EQ(content(in("hall.ply")), new_ply);
     EXPECT_FALSE(std::filesystem::exists(in("hall.ply.part")));
     EXPECT_EQ(content(in("yard.ply")), "what was there");
+    EXPECT_FALSE(std::filesystem::exists(in("yard.ply.part")));
+}
+
+TEST(MapStore, WhatAKillHasLeftUnfinishedIsRemovedAndNothingElse) {
+    const test::TemporaryFolder folder;
+    const auto write = [&](const char* name) { std::ofstream(folder.path() / name) << "half"; };
+    for (const char* name : {"hall.pcd.part", "hall.ply.part", "notes.part", ".x.pcd.part", "part"}) write(name);
+    const std::set<std::string> others = {"notes.part", ".x.pcd.part", "part"};
+    MapStore store({.folder = folder.path().string()});
+    EXPECT_EQ(files_in(folder.path()), others) << "at the start";
+    write("yard.ply.part");
+    EXPECT_TRUE(store.save("", points(1)).ok);
+    EXPECT_FALSE(std::filesystem::exists(folder.path() / "yard.ply.part")) << "at the next save";
+}
+
+TEST(MapStore, WhatAnotherProgramIsSavingStays) {
+    const test::TemporaryFolder folder;
+    std::ofstream(folder.path() / "hall.pcd.part") << "half";
+    const int other = ::open(folder.path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    ASSERT_EQ(::flock(other, LOCK_SH), 0);
+    const MapStore store({.folder = folder.path().string()});
+    EXPECT_TRUE(store.save("yard", points(1)).ok) << "two may save at a time";
+    EXPECT_TRUE(std::filesystem::exists(folder.path() / "hall.pcd.part"));
+    ::close(other);
+    const MapStore next({.folder = folder.path().string()});
+    EXPECT_FALSE(std::filesystem::exists(folder.path() / "hall.pcd.part"));
 }
 
 TEST(MapStore, AMapWithoutPointsReplacesNone) {
