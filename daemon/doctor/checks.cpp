@@ -152,7 +152,8 @@ Check check_clock_synchronised() {
     return check;
 }
 
-Check check_disk(const std::filesystem::path& directory, std::uint64_t wanted_bytes) {
+Check check_disk(const std::filesystem::path& directory, std::uint64_t wanted_bytes,
+                 const std::optional<InstalledService>& service) {
     Check check{"disk", Verdict::kGood, "", ""};
     const std::filesystem::path there = nearest_existing(directory);
     struct statvfs space {};
@@ -164,7 +165,15 @@ Check check_disk(const std::filesystem::path& directory, std::uint64_t wanted_by
         return {check.name, Verdict::kFailure, there.string() + " is no folder",
                 "name another folder than " + directory.string()};
     }
-    if (::access(there.c_str(), W_OK) != 0) {
+    if (service && !service->may_write(directory)) {
+        return {check.name, Verdict::kWarning,
+                directory.string() + " is outside of " + service->state_directory.string() + ", where " +
+                    service->unit + " may write",
+                "name a folder in there, by a relative path, or let the service in: sudo systemctl edit " +
+                    service->unit + ", [Service], ReadWritePaths=" + directory.string() +
+                    ", and a User= who may write there"};
+    }
+    if (!service && ::access(there.c_str(), W_OK) != 0) {
         return {check.name, Verdict::kFailure, there.string() + " is not writable",
                 "sudo chown $USER " + there.string() + " (the service has a directory of its own)"};
     }

@@ -3,7 +3,10 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
+
+#include "daemon/doctor/installed_service.hpp"
 
 namespace dlod::daemon {
 
@@ -37,8 +40,10 @@ Check check_locked_memory(bool configured);
 Check check_clock_synchronised();
 
 /// Are at least `wanted_bytes` free in `directory`, what its files take included, and may files be made there? Where it
-/// is not there yet, dlod makes it: then the folder that it will be in is looked at.
-Check check_disk(const std::filesystem::path& directory, std::uint64_t wanted_bytes);
+/// is not there yet, dlod makes it: then the folder that it will be in is looked at. In a service's own directory,
+/// which systemd makes for it, only room is looked for; elsewhere its unit must let it in.
+Check check_disk(const std::filesystem::path& directory, std::uint64_t wanted_bytes,
+                 const std::optional<InstalledService>& service = std::nullopt);
 
 /// Does the sensor answer over HTTP? An empty host is good: metadata come from a file then.
 Check check_sensor(const std::string& host, const std::string& metadata);
