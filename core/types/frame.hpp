@@ -21,12 +21,12 @@ namespace dlod {
 
 /// Written by the frame builder.
 struct FrameHeader {
-    std::uint64_t sequence = 0;       ///< counts emitted frames from 0
+    std::uint64_t sequence = 0;       ///< counts frames from 0, also those dropped for want of a free one
     std::uint32_t frame_id = 0;       ///< the sensor's own, wraps
     std::int64_t stamp_ns = 0;        ///< sensor time of the last valid column: the frame's pose refers to it
     std::int64_t first_stamp_ns = 0;  ///< sensor time of the first valid column
-    std::int64_t receive_ns =
-        0;  ///< host time (CLOCK_REALTIME) of the packet that completed it, capture time in replay
+    /// Host time (CLOCK_REALTIME) of the packet that completed it, capture time in replay.
+    std::int64_t receive_ns = 0;
     int valid_columns = 0;
     bool usable = false;  ///< enough valid columns for odometry
 };
