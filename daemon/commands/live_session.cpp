@@ -36,8 +36,8 @@ std::unique_ptr<SessionMessages> make_messages(const Config& config, const drive
 constexpr std::int64_t kSilence_ns = 2'000'000'000;
 /// Packets that do not fit the metadata, or whose sensor has started anew: it may be another one.
 constexpr std::string_view kUnfitCounters[] = {"wrong_size_packets", "wrong_type_packets", "foreign_packets",
-                                               "unusable_frames",    "restarts",           "frame_id_jumps",
-                                               "clock_jumps"};
+                                               "damaged_packets",    "unusable_frames",    "restarts",
+                                               "frame_id_jumps",     "clock_jumps"};
 
 std::int64_t monotonic_ns() {
     return StepTimer::now_ns(CLOCK_MONOTONIC);

@@ -35,6 +35,10 @@ void check_configure(const SensorConfig& sensor) {
 }
 
 void check_sensor(const SensorConfig& sensor) {
+    if (sensor.host.find_first_of("/ \t") != std::string::npos) {
+        throw ConfigError(fmt::format(
+            "sensor.host: '{}' is no name or address; as in os-122150001234.local, or 192.168.1.20", sensor.host));
+    }
     if (sensor.lidar_port != 0 && sensor.lidar_port == sensor.imu_port) {
         throw ConfigError("sensor.imu_port: must differ from sensor.lidar_port");
     }

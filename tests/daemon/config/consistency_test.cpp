@@ -39,6 +39,7 @@ TEST(Consistency, ErrorsNameTheKey) {
              {"extrinsics.rotation_wxyz", {"extrinsics.rotation_wxyz=[1, 1, 0, 0]"}},
              {"sensor.imu_port", {"sensor.lidar_port=7000", "sensor.imu_port=7000"}},
              {"sensor.bind_address", {"sensor.bind_address=eth0"}},
+             {"sensor.host", {"sensor.host=http://192.168.1.20/"}},
              {"sensor.sender", {"sensor.sender=os-1.local"}},
              {"sensor.multicast_group", {"sensor.multicast_group=192.168.1.5"}},
              {"sensor.multicast_group", {"sensor.multicast_group=all"}},
