@@ -30,6 +30,9 @@ for subcommand in $subcommands; do
 done
 [[ $(complete_words dlod command save) == save-map ]] || fail "'dlod command save' is not completed"
 [[ $(complete_words dlod-sim squ) == square ]] || fail "'dlod-sim squ' is not completed"
+[[ $(complete_words dlod-sim --movers n) == none ]] || fail "'dlod-sim --movers n' is not completed"
+[[ -z $(complete_words dlod-sim --seed "") ]] || fail "a number is completed after 'dlod-sim --seed'"
+[[ $(complete_words dlod-sim --lap squ) == square ]] || fail "the scene is not completed after a flag"
 # Not through pipes: grep ends at the first match, and whoever still writes then would fail.
 grep -qx 'odometry.use_imu=' <<<"$(complete_words dlod run --set odometry.)" || fail "keys are not completed after --set"
 
