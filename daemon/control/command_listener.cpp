@@ -46,6 +46,7 @@ struct CommandListener::State {
     void listen_until_failure(lcm_t* lcm);
     /// @return false where told to stop
     bool wait(int descriptor, std::chrono::milliseconds timeout);
+    bool is_stopped() { return !wait(-1, std::chrono::milliseconds(0)); }
 };
 
 bool CommandListener::State::wait(int descriptor, std::chrono::milliseconds timeout) {
@@ -58,7 +59,7 @@ void CommandListener::State::listen() {
     do {
         const Lcm lcm(has_route(url) ? ::lcm_create(url.empty() ? nullptr : url.c_str()) : nullptr);
         if (lcm) listen_until_failure(lcm.get());
-        if (!wait(-1, std::chrono::milliseconds(0))) return;
+        if (is_stopped()) return;
         warnings.warn("deaf",
                       fmt::format("commands on {} cannot be received: multicast does not work; see dlod doctor. "
                                   "It is tried again every {} s",
@@ -76,7 +77,8 @@ void CommandListener::State::listen_until_failure(lcm_t* lcm) {
     // A subscription is a regular expression: this one means the channel as it is written.
     if (::lcm_subscribe(lcm, ("\\Q" + channel + "\\E").c_str(), handler, this) == nullptr) return;
     const int descriptor = ::lcm_get_fileno(lcm);
-    if (descriptor < 0) return;
+    // What was left behind here while LCM tried multicast out touches nothing that the program's end takes down.
+    if (descriptor < 0 || is_stopped()) return;
     spdlog::debug("listening for commands on {}", channel);
     while (wait(descriptor, std::chrono::milliseconds(-1))) {
         if (::lcm_handle_timeout(lcm, 0) < 0) return;

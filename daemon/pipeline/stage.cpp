@@ -5,6 +5,9 @@ namespace dlod::daemon {
 PipelineFrame* IntakeStage::drop_oldest() {
     PipelineFrame* frame = Stage::take();
     left_behind_.insert(left_behind_.end(), frame->imu.begin(), frame->imu.end());
+    if (left_behind_.size() > kMostLeftBehind) {
+        left_behind_.erase(left_behind_.begin(), left_behind_.end() - static_cast<std::ptrdiff_t>(kMostLeftBehind));
+    }
     dropped_frames_.store(dropped_frames() + 1);
     return frame;
 }

@@ -79,6 +79,10 @@ class IntakeStage final : public Stage {
     PipelineFrame* steal();
     std::uint64_t dropped_frames() const { return dropped_frames_.load(); }
 
+    /// Readings of the IMU that the next frame takes over from those dropped before it, at most: some seconds of them.
+    /// Beyond, the newest ones, however long the stages behind hang.
+    static constexpr std::size_t kMostLeftBehind = 1024;
+
   protected:
     PipelineFrame* take() override;
 

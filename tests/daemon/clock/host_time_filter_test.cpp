@@ -195,5 +195,22 @@ TEST(HostTimeFilter, AStepBackLaterOnIsOneHoweverSmall) {
     EXPECT_NEAR(static_cast<double>(step.by_ns) * 1e-6, -80.0, 1.0);
 }
 
+TEST(HostTimeFilter, TimesAtTheEndsOfWhatASensorMaySendDoNotOverflow) {
+    constexpr std::int64_t kLatest = (std::int64_t{1} << 62U) - 1;
+    HostTimeFilter filter;
+    std::int64_t host = Simulation::kHostEpoch;
+    std::int64_t last = 0;
+    for (const std::int64_t sensor : {std::int64_t{0}, kLatest, std::int64_t{0}, kLatest - kSecond, kLatest / 2}) {
+        for (int i = 0; i < 30; ++i) {
+            host += 100 * kMs;
+            filter.add(std::min(sensor + i * 100 * kMs, kLatest), host);
+            const std::int64_t stamp = filter.next_stamp_ns(std::min(sensor + i * 100 * kMs, kLatest));
+            EXPECT_GT(stamp, last) << sensor << " " << i;
+            last = stamp;
+        }
+        EXPECT_NEAR(1e-9 * static_cast<double>(last - host), 0.0, 5.0) << "after seconds it is the host's time again";
+    }
+}
+
 }  // namespace
 }  // namespace dlod::daemon
