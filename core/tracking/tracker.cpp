@@ -164,7 +164,7 @@ void Tracker::State::join_pieces(Frame& frame) {
             const bool divided = detections[of_host].segment == detections[of_guest].segment &&
                                  (front_and_rest(of_host, of_guest) || front_and_rest(of_guest, of_host));
             if (!divided && !pieces_of_one_vehicle(object_of(of_host), detections[of_host], object_of(of_guest),
-                                                   detections[of_guest], frame, projection))
+                                                   detections[of_guest], frame, shapes, projection))
                 continue;
             if (object_of(of_guest).goes_before(object_of(of_host))) std::swap(of_host, of_guest);
             object_of(of_host).join(detections[of_guest].box);

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
+#include "core/tracking/bounding_box.hpp"
 #include "core/tracking/box_iou.hpp"
 
 namespace dlod {
@@ -37,11 +39,48 @@ constexpr double kBumperHeight_m = 1.0;
 constexpr double kFront_m = 0.8;
 constexpr double kBehind_m = 1.0;  // what is farther than both pieces is seen between them
 constexpr int kPlaces = 5;
+constexpr double kReflected_m = 1.5;  // what glass shows seems to be that much beyond the vehicle's end at most
+constexpr double kFringe = 0.01;      // of tangents: edges are seen within a beam or two
 
 /// Bumper and windscreen: both wider than people, the lower one lower, too.
 bool are_front(const OrientedBox& a, const OrientedBox& b, const Eigen::Vector2d& across) {
     const OrientedBox& lower = a.center_m.z() < b.center_m.z() ? a : b;
     return lower.size_m.z() < kBumperHeight_m && std::min(width_along(a, across), width_along(b, across)) > kFront_m;
+}
+
+/// What a sensor sees of a detection: its sides and its upper and lower edge, as tangents about a direction.
+struct Outline {
+    Outline(const PointSpan& points, const Eigen::Vector3d& origin_m, const Eigen::Vector3d& sensor_m,
+            const Eigen::Vector2d& ahead) {
+        const Eigen::Vector3f offset = (origin_m - sensor_m).cast<float>();
+        const auto c = static_cast<float>(ahead.x()), s = static_cast<float>(ahead.y());
+        for (std::size_t i = 0; i < points.size(); ++i) {
+            const float x = points.x[i] + offset.x(), y = points.y[i] + offset.y(), z = points.z[i] + offset.z();
+            const float depth = c * x + s * y;
+            if (depth <= 0.0F) continue;
+            const Eigen::Vector2f at((c * y - s * x) / depth, z / std::hypot(x, y));
+            low = low.cwiseMin(at);
+            high = high.cwiseMax(at);
+        }
+    }
+    bool encloses(const Outline& other) const {
+        return (other.low.array() > low.array() - static_cast<float>(kFringe)).all() &&
+               (other.high.array() < high.array() + static_cast<float>(kFringe)).all();
+    }
+
+    Eigen::Vector2f low = Eigen::Vector2f::Constant(std::numeric_limits<float>::max());
+    Eigen::Vector2f high = Eigen::Vector2f::Constant(std::numeric_limits<float>::lowest());
+};
+
+/// Whether `inner` is seen within the outline of a vehicle that is nearer.
+bool seen_through(const Detection& vehicle, const Detection& inner, const DetectionShapes& shapes,
+                  const Eigen::Vector3d& sensor_m) {
+    const Eigen::Vector2d ahead = (vehicle.centroid_m - sensor_m).head<2>();
+    if ((inner.centroid_m - sensor_m).head<2>().squaredNorm() < ahead.squaredNorm()) return false;
+    const auto outline = [&](const Detection& d) {
+        return Outline(shapes.points(d), shapes.origin(), sensor_m, ahead.normalized());
+    };
+    return outline(vehicle).encloses(outline(inner));
 }
 
 /// Whether something farther than both is seen between two detections.
@@ -102,7 +141,8 @@ bool one_vehicle(const TrackedObject& whole, const TrackedObject& piece) {
 }
 
 bool pieces_of_one_vehicle(const TrackedObject& a, const Detection& seen_a, const TrackedObject& b,
-                           const Detection& seen_b, const Frame& frame, const SweepProjection& projection) {
+                           const Detection& seen_b, const Frame& frame, const DetectionShapes& shapes,
+                           const SweepProjection& projection) {
     const Eigen::Vector2d between = (seen_b.box.center_m - seen_a.box.center_m).head<2>();
     if (between.squaredNorm() > kLongest_m * kLongest_m || !a.under_way() || !b.under_way()) return false;
     const double sd = std::max(a.velocity_sd(), b.velocity_sd());
@@ -112,9 +152,20 @@ bool pieces_of_one_vehicle(const TrackedObject& a, const Detection& seen_a, cons
     if (speed < std::max(kMoving_mps, 2.0 * sd)) return false;
     const double differs = std::hypot(kSameSpeed * speed, a.velocity_sd(), b.velocity_sd());
     if ((va - vb).norm() > differs) return false;
+    // Boxes along the axes of what is seen of each would reach farther than the pieces do.
     const double yaw = std::atan2(va.y() + vb.y(), va.x() + vb.x());
-    const Eigen::Vector2d joint_m = joint_size(seen_a.box, seen_b.box, yaw);
-    if (joint_m.x() > kLongest_m || joint_m.y() > kWidest_m) return false;
+    const auto along_velocity = [&](const Detection& d) { return box_at_yaw(shapes.points(d), shapes.origin(), yaw); };
+    const OrientedBox box_a = along_velocity(seen_a), box_b = along_velocity(seen_b);
+    const Eigen::Vector2d joint_m = joint_size(box_a, box_b, yaw);
+    if (joint_m.y() > kWidest_m) return false;
+    const Eigen::Vector3d sensor = frame.odometry.T_world_sensor.translation();
+    const auto interior = [&](const TrackedObject& vehicle, const Detection& seen, const OrientedBox& box,
+                              const Detection& inner) {
+        return vehicle.drives() && box.size_m.y() > kNarrowest_m && joint_m.x() < kLongest_m + kReflected_m &&
+               seen_through(seen, inner, shapes, sensor);
+    };
+    if (interior(a, seen_a, box_a, seen_b) || interior(b, seen_b, box_b, seen_a)) return true;
+    if (joint_m.x() > kLongest_m) return false;
     const bool larger = std::max(a.box().longest_m(), b.box().longest_m()) > kLonger_m;
     const Eigen::Vector2d across(-std::sin(yaw), std::cos(yaw));
     if (speed < (larger ? kDriving_mps : kRunning_mps) && !are_front(a.box(), b.box(), across)) return false;

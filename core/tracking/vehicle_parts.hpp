@@ -3,6 +3,7 @@
 #pragma once
 
 #include "core/projection/sweep_projection.hpp"
+#include "core/tracking/detection_shapes.hpp"
 #include "core/tracking/tracked_object.hpp"
 
 namespace dlod {
@@ -29,8 +30,10 @@ bool one_vehicle(const TrackedObject& whole, const TrackedObject& piece);
 
 /// Two tracks at the same velocity that together are no larger than a car or a van, where nothing behind is seen
 /// between them; at the speed of vehicles, or the lower one wider and lower than people are: bumper and windscreen.
+/// Likewise what is seen through the panes of a vehicle that drives, and drives along: seats, and the far side.
 /// @param projection set to the frame's pose
 bool pieces_of_one_vehicle(const TrackedObject& a, const Detection& seen_a, const TrackedObject& b,
-                           const Detection& seen_b, const Frame& frame, const SweepProjection& projection);
+                           const Detection& seen_b, const Frame& frame, const DetectionShapes& shapes,
+                           const SweepProjection& projection);
 
 }  // namespace dlod
