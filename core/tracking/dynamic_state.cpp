@@ -146,6 +146,8 @@ DynamicState MotionBelief::fused(const MotionCues& cues, const DynamicStateConfi
         rested_ = rest_s_ >= (halted ? kResting : 1.0) * config.rest_time_s;
         off_anchor_ = 0;
         if (!rested_ && !mistaken) return state_;
+        // It had come to within a step of here when it began to rest.
+        anchor_m_ = cues.position_m;
         log_odds_ = std::min(log_odds_, 0.0);
         return DynamicState::kStatic;
     }
