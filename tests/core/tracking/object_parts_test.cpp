@@ -125,6 +125,33 @@ TEST_F(ObjectPartsTest, BumperAndWindscreenAreOneTrack) {
     }
 }
 
+// Seats and the rear panel of a van, through its windscreen: too far behind its front to be a piece of a car.
+TEST_F(ObjectPartsTest, WhatIsSeenThroughTheWindscreenBelongsToTheVan) {
+    struct Case {
+        double y_m, top_m;
+        std::size_t tracks;
+    };
+    // Within the van's outline; beside it, as one who drives along; above it.
+    for (const Case& inner : {Case{0.0, 0.5, 1}, Case{3.0, 0.5, 2}, Case{0.0, 1.4, 2}}) {
+        Tracker tracker(sensor, config);
+        for (int k = 0; k < 30; ++k) {
+            scene.next();
+            const double x = 25.0 - 0.5 * k;
+            Cylinder front = person(x, 0.0);
+            front.radius_m = 0.9;
+            front.height_m = 2.0;
+            scene.add(front);
+            Cylinder seats = person(x + 5.0, inner.y_m);
+            seats.foot_m.z() = inner.top_m - 0.5;
+            seats.radius_m = 0.4;
+            seats.height_m = 0.5;
+            scene.add(seats);
+            tracker.process(scene.frame);
+        }
+        EXPECT_EQ(scene.frame.detection.tracks.size(), inner.tracks) << inner.y_m << ' ' << inner.top_m;
+    }
+}
+
 TEST_F(ObjectPartsTest, ADogBeforeItsOwnerKeepsItsTrack) {
     Tracker tracker(sensor, config);
     for (int k = 0; k < 30; ++k) {
