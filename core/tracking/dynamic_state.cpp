@@ -18,6 +18,7 @@ constexpr double kSustained = 0.7;    // least trust in a displacement that agre
 constexpr double kWalked = 1.5;       // log-odds of a way longer than the object
 constexpr double kUnconfirmed = 0.3;  // trust in a displacement where no free space was tested
 constexpr double kMaxLogOdds = 8.0;   // bounds keep a belief reversible
+constexpr double kStands = -1.0;      // log-odds of a frame in which its own points lie where they were
 constexpr double kMaxStep = 2.4;      // one frame alone never decides
 constexpr double kAway_m = 0.15;      // from the mean place of rest
 constexpr double kRestMean = 0.1;     // weight of a new position in that mean
@@ -64,6 +65,11 @@ double motion_log_odds(const MotionCues& cues, const DynamicStateConfig& config)
         }
     }
     if (cues.sustained_displacement) trust = std::max(trust, kSustained);
+    // Panes show now this, now that, where others saw through them: the object itself has not moved for all that.
+    if (cues.stands) {
+        sum = std::min(sum, 0.0);
+        trust = 0.0;
+    }
     if (config.use_residual && cues.residual_points > 0 && cues.height_m > 0.0) {
         const double ratio = cues.average_residual_m / std::max(1e-3, config.theta_res * cues.height_m);
         const double excess = std::clamp(ratio - 1.0, -1.0, 2.0);
@@ -112,7 +118,11 @@ void MotionBelief::rest(const MotionCues& cues, const DynamicStateConfig& config
     }
 }
 
-DynamicState MotionBelief::fused(const MotionCues& cues, const DynamicStateConfig& config) {
+DynamicState MotionBelief::fused(const MotionCues& seen, const DynamicStateConfig& config) {
+    MotionCues cues = seen;
+    // What is known to move has stopped, and a door's leaf hardly moves at its hinge.
+    has_turned_ = has_turned_ || seen.turned;
+    cues.stands = config.use_displacement && seen.stands && !known_to_move_ && !has_turned_;
     double step = motion_log_odds(cues, config);
     // What comes into view where nothing was ever seen differs from the map, too: that makes it a suspect, no more.
     if (config.use_free_space && free_share(cues) < 0.0 && !cues.sustained_displacement) {
@@ -135,11 +145,13 @@ DynamicState MotionBelief::fused(const MotionCues& cues, const DynamicStateConfi
     // What sets off stands where it stood itself: until it has left that place the free space does not speak for it.
     const bool sets_off = config.use_displacement && cues.set_off;
     if (sets_off && has_set_off()) log_odds_ = std::max(log_odds_, config.dynamic_log_odds);
+    if (cues.stands && state_ == DynamicState::kDynamic)
+        log_odds_ = std::min(log_odds_, config.dynamic_log_odds) + kStands;
     rest(cues, config);
     if (state_ == DynamicState::kDynamic) {
         // Where it has come to rest, the past says the same as where it has never moved: but what has long been
         // dynamic was none of that.
-        const bool mistaken = log_odds_ <= config.static_log_odds;
+        const bool mistaken = log_odds_ <= (cues.stands ? 0.0 : config.static_log_odds);
         dynamic_s_ += cues.dt_s;
         known_to_move_ = known_to_move_ || dynamic_s_ >= config.rest_time_s;
         const bool halted = mistaken && dynamic_s_ >= config.rest_time_s;

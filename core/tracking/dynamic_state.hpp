@@ -24,6 +24,7 @@ struct MotionCues {
     bool sustained_displacement = false;  ///< it has agreed with the filtered velocity for a while
     bool left_its_place = false;          ///< and is longer than that what it hides could feign
     bool set_off = false;                 ///< what rested is displaced from where it did
+    bool stands = false;                  ///< its own points lie where they were, and its middle does
     Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< filtered centre, ground plane
     double dt_s = 0.0;                                     ///< since the detection before
 
@@ -63,6 +64,7 @@ class MotionBelief {
     double rest_s_ = 0.0;
     double dynamic_s_ = 0.0;  ///< in the state dynamic, the last time
     bool known_to_move_ = false;
+    bool has_turned_ = false;  ///< as a door does
     int detections_ = 0;
     Eigen::Vector2d anchor_m_ = Eigen::Vector2d::Zero();  ///< where it has rested for rest_s_
     int off_anchor_ = 0;                                  ///< consecutive detections away from there

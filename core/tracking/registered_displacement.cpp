@@ -15,6 +15,9 @@ constexpr float kOutlier_m = 0.15F;      // plane distances are bounded here
 constexpr float kMaxNeighbour_m = 1.5F;  // planes end somewhere; as far as that a wall may have come into view
 constexpr float kInPlace_m = 0.06F;      // so near the old surface a point has not moved
 constexpr double kMostInPlace = 0.4;     // of an object's points, while it moves
+constexpr double kLeastInPlace = 0.6;    // while it stands, of those that face either way,
+constexpr double kAllInPlace = 0.8;      // or of all
+constexpr double kShows_m = 0.075;       // a shorter way may leave a point in place
 constexpr int kIterations = 4;
 constexpr double kNoise_m = 0.04;     // of a plane distance: pose, range noise, curvature
 constexpr double kIndependent = 6.0;  // so many independent points are believed in, however many there are
@@ -87,6 +90,8 @@ struct Fit {
     Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
     int inliers = 0;
     int in_place = 0;
+    Eigen::Matrix2d seen = Eigen::Matrix2d::Zero();    ///< sum of n n^T over all points
+    Eigen::Matrix2d stayed = Eigen::Matrix2d::Zero();  ///< over those in place
 };
 
 /// Distances of the points, moved back by d, to the tangent planes of the nearest points before.
@@ -104,6 +109,7 @@ Fit fit(const PointSample& before, const PointSample& now, const Eigen::Vector2d
     nearest(before.size, before.x.data(), before.y.data(), before.z.data(), px.data(), py.data(), pz.data(),
             distance2.data(), index.data());
     float xx = 0.0F, xy = 0.0F, yy = 0.0F, gx = 0.0F, gy = 0.0F, cost = 0.0F;
+    float all_xx = 0.0F, all_xy = 0.0F, in_xx = 0.0F, in_xy = 0.0F;  // of unit normals: yy = 1 - xx
     for (std::size_t i = 0; i < now.size; ++i) {
         const auto j = static_cast<std::size_t>(index[i]);
         const float nx = before.nx[j], ny = before.ny[j];
@@ -111,7 +117,14 @@ Fit fit(const PointSample& before, const PointSample& now, const Eigen::Vector2d
         const bool found = distance2[i] < kMaxNeighbour_m * kMaxNeighbour_m;
         const float bounded = found ? std::min(std::abs(distance_m), kOutlier_m) : kOutlier_m;
         cost += bounded * bounded;
-        if (bounded < kInPlace_m) ++f.in_place;
+        const float own_xx = now.nx[i] * now.nx[i], own_xy = now.nx[i] * now.ny[i];
+        all_xx += own_xx;
+        all_xy += own_xy;
+        if (bounded < kInPlace_m) {
+            ++f.in_place;
+            in_xx += own_xx;
+            in_xy += own_xy;
+        }
         if (!found || std::abs(distance_m) > 2.0F * kOutlier_m) continue;
         xx += nx * nx;
         xy += nx * ny;
@@ -122,8 +135,16 @@ Fit fit(const PointSample& before, const PointSample& now, const Eigen::Vector2d
     }
     f.information << xx, xy, xy, yy;
     f.gradient << gx, gy;
+    f.seen << all_xx, all_xy, all_xy, static_cast<float>(now.size) - all_xx;
+    f.stayed << in_xx, in_xy, in_xy, static_cast<float>(f.in_place) - in_xx;
     f.cost_m2 = cost / static_cast<double>(std::max<std::size_t>(1, now.size));
     return f;
+}
+
+/// Smaller eigenvalue of a symmetric matrix, or of a product of two positive ones.
+double smaller_eigenvalue(const Eigen::Matrix2d& m) {
+    const double half_trace = 0.5 * m.trace();
+    return half_trace - std::sqrt(std::max(0.0, half_trace * half_trace - m.determinant()));
 }
 
 /// From the mean of the points before to that of those now.
@@ -179,10 +200,10 @@ RegisteredDisplacement register_displacement(const PointSample& before, const Po
     best.normals = stayed.information / std::max(1, stayed.inliers);
     best.in_place = static_cast<double>(stayed.in_place) / static_cast<double>(now.size);
     if (stayed.inliers > 0) {
-        const Eigen::Matrix2d mean = stayed.information / stayed.inliers;
-        const double half_trace = 0.5 * mean.trace();
-        best.observable = half_trace - std::hypot(0.5 * (mean(0, 0) - mean(1, 1)), mean(0, 1));
+        best.observable = smaller_eigenvalue(stayed.information / stayed.inliers);
     }
+    if (smaller_eigenvalue(stayed.seen) > kMinObservable * static_cast<double>(now.size))
+        best.in_place_every_way = smaller_eigenvalue(stayed.seen.inverse() * stayed.stayed);
     for (const Eigen::Vector2d& start : {Eigen::Vector2d::Zero().eval(), guess_m, between_means(before, now)}) {
         Eigen::Vector2d d = start;
         for (int k = 0; k < kIterations; ++k) {
@@ -215,6 +236,12 @@ Eigen::Matrix2d velocity_covariance(const RegisteredDisplacement& r, double elap
 
 double displacement_chi2(const RegisteredDisplacement& r) {
     return r.points * r.displacement_m.dot(r.normals * r.displacement_m) / (kNoise_m * kNoise_m);
+}
+
+bool stands(const RegisteredDisplacement& r, double elapsed_s, double speed_mps, double shift_m) {
+    const double way_m = speed_mps * elapsed_s;
+    return r.points > 0 && way_m > kShows_m && shift_m < way_m &&
+           (r.in_place > kAllInPlace || r.in_place_every_way > kLeastInPlace);
 }
 
 double displacement_log_odds(const RegisteredDisplacement& r, double elapsed_s) {

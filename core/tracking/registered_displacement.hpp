@@ -33,6 +33,9 @@ struct RegisteredDisplacement {
     double stayed_m2 = 0.0;  ///< mean squared distance to the tangent planes without displacement, outliers bounded
     double moved_m2 = 0.0;   ///< likewise with it
     double in_place = 1.0;   ///< share of the points that still lie where the surface was
+    /// The same of those points of which a motion in one direction would show, in the direction where it is least; 0
+    /// where too little shows it.
+    double in_place_every_way = 0.0;
     /// How well the normals fix a displacement in the direction where they do so least; 0.5: in all directions alike.
     double observable = 0.0;
     Eigen::Matrix2d normals = Eigen::Matrix2d::Zero();  ///< mean of n n^T over the points that fit when displaced
@@ -54,6 +57,12 @@ Eigen::Matrix2d velocity_covariance(const RegisteredDisplacement& r, double elap
 
 /// Squared length of the displacement in units of its noise: chi-squared of two degrees of freedom for what has stayed.
 double displacement_chi2(const RegisteredDisplacement& r);
+
+/// Whether an object stands: a motion at `speed_mps` or faster would have been seen, but most of its points lie where
+/// they were, of all or of those that face either way, and so does its middle. Of a plane that moves along itself the
+/// points alone do.
+/// @param shift_m of the middle of the object, ground plane
+bool stands(const RegisteredDisplacement& r, double elapsed_s, double speed_mps, double shift_m);
 
 /// Log-odds of "moved" against "stayed": positive where a displacement explains the points much better than none,
 /// negative where they lie where they were and a motion would have shown.

@@ -31,13 +31,16 @@ constexpr double kMostSlip_rad = 0.6;  // between an object's heading and its si
 constexpr double kAgreeing_m = 0.3;    // a shorter displacement may be noise
 constexpr double kAgreement = 0.4;     // of its length, from what the velocity predicts
 constexpr int kAgreeingFrames = 4;
-constexpr double kGross_m = 1.0;       // nothing that rests seems to move that far
-constexpr int kTrustedFrames = 2;      // until the registered velocity of a large object is one
-constexpr double kLarge_m = 1.6;       // footprint diagonal
-constexpr double kEnters = 0.05;       // of the points, in free space, of what sets off for the first time
-constexpr double kStale_s = 2.0;       // older ones show another side
-constexpr double kReference_s = 0.45;  // points to register to are renewed that often
-constexpr double kReference_m = 1.0;   // and after such a way: a fast object soon shows another side
+constexpr double kGross_m = 1.0;         // nothing that rests seems to move that far
+constexpr int kTrustedFrames = 2;        // until the registered velocity of a large object is one
+constexpr double kLarge_m = 1.6;         // footprint diagonal
+constexpr double kEnters = 0.05;         // of the points, in free space, of what sets off for the first time
+constexpr double kStale_s = 2.0;         // older ones show another side
+constexpr double kSureSpeed = 3.0;       // standard deviations
+constexpr double kSlow_mps = 0.3;        // of what moves
+constexpr double kSettingOff_mps = 0.8;  // of what has set off, once it stands where it did not before
+constexpr double kReference_s = 0.45;    // points to register to are renewed that often
+constexpr double kReference_m = 1.0;     // and after such a way: a fast object soon shows another side
 
 const DetectionShape& largest_shape(const DetectionShapes& shapes, const Sighting& sighting) {
     return shapes[sighting.detections.front()];
@@ -152,6 +155,8 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
         filter_.update(m, config.filter);
         assume_extent(sighting.visibility);
     }
+    has_moved_ = has_moved_ || (belief_.state() == DynamicState::kDynamic && filter_.speed() > kHeadingSpeed_mps &&
+                                filter_.speed() > kSureSpeed * filter_.velocity_sd());
     const double shift_m = visible_shift_m(first_visible_, visible_);
     const bool whole = sighting.detections.size() == 1 && !sighting.cut && !sighting.apart &&
                        !sighting.visibility.occluded_left && !sighting.visibility.occluded_right;
@@ -268,7 +273,7 @@ bool TrackedObject::clear_without_displacement(const MotionCues& cues) const {
     if (drives()) return false;  // its velocity is measured that way
     if (filter_.speed() > kHeadingSpeed_mps && filter_.speed() > 2.0 * filter_.velocity_sd())
         return belief_.state() == DynamicState::kDynamic && share > 0.3;
-    if (belief_.state() == DynamicState::kDynamic) return share > 0.3;
+    if (belief_.state() == DynamicState::kDynamic) return share > 0.3 && belief_.known_to_move();
     return belief_.state() == DynamicState::kStatic && share < 0.05;
 }
 
@@ -291,6 +296,11 @@ void TrackedObject::displacement_cue(const Frame& frame, const Sighting& sightin
         const double elapsed_s = before_.age_s - now.age_s;
         const auto r = register_displacement(before_, now, center - before_center_m_);
         cues.displacement_log_odds = displacement_log_odds(r, elapsed_s);
+        const bool decided = belief_.state() == DynamicState::kStatic;
+        // Of somebody who stands there some part moves now and then, before he walks on.
+        const bool somebody = filter_.box().longest_m() < kTwoBodies_m && filter_.box().size_m.z() > kBody_m;
+        cues.stands = !has_moved_ && !somebody &&
+                      stands(r, elapsed_s, decided ? kSettingOff_mps : kSlow_mps, (center - before_center_m_).norm());
         if (sighting.visibility.through_gap() && cues.free_points == 0)
             cues.displacement_log_odds = std::min(cues.displacement_log_odds, 0.0);
         // Of what has never moved all has to speak for it: a wall seen through an opening seems to be displaced.

@@ -111,6 +111,7 @@ class TrackedObject {
     SetOff set_off_;
     double lifetime_s_ = 0.0;
     bool was_dynamic_ = false;
+    bool has_moved_ = false;  ///< beyond doubt, by its velocity
     double unseen_s_ = 0.0;
     double residual_m_ = 0.0;
     int points_ = 0;  ///< of the last sighting

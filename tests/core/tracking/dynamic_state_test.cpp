@@ -161,6 +161,42 @@ TEST(DynamicState, AMistakeIsTakenBack) {
     EXPECT_LT(frames, 15);
 }
 
+// The panes of a parked car show now this, now that, where earlier frames saw through them.
+TEST(DynamicState, WhatStandsDoesNotMoveWhateverTheFreeSpaceSays) {
+    const DynamicStateConfig config;
+    MotionCues panes = free_cue(40, 60);
+    MotionBelief without;
+    for (int n = 0; n < 4; ++n) without.update(panes, config);
+    ASSERT_EQ(without.state(), DynamicState::kDynamic);
+    panes.stands = true;
+    MotionBelief belief;
+    for (int n = 0; n < 20; ++n) {
+        belief.update(panes, config);
+        EXPECT_NE(belief.state(), DynamicState::kDynamic);
+    }
+    // A mistake is taken back within a few frames.
+    for (int n = 0; n < 5; ++n) without.update(panes, config);
+    EXPECT_EQ(without.state(), DynamicState::kStatic);
+}
+
+TEST(DynamicState, WhatIsKnownToMoveAndStandsIsNoMistake) {
+    const DynamicStateConfig config;
+    MotionBelief belief;
+    for (int n = 0; n < 35; ++n) {
+        MotionCues cues = free_cue(60, 10);
+        cues.position_m.x() = 0.1 * n;
+        belief.update(cues, config);
+    }
+    ASSERT_TRUE(belief.known_to_move());
+    MotionCues halt = free_cue(60, 10);
+    halt.position_m.x() = 3.4;
+    halt.stands = true;
+    for (int n = 0; n < 20; ++n) belief.update(halt, config);
+    EXPECT_EQ(belief.state(), DynamicState::kDynamic);
+    for (int n = 0; n < 15; ++n) belief.update(halt, config);
+    EXPECT_EQ(belief.state(), DynamicState::kStatic);
+}
+
 // A bus that halts stands where it was seen a moment ago; when it sets off its side slides along itself.
 TEST(DynamicState, WhatCameToRestSetsOffByItsWayAloneEvenIfThePastSpokeAgainstItSoon) {
     const DynamicStateConfig config;

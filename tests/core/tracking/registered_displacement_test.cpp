@@ -101,6 +101,29 @@ TEST(RegisteredDisplacement, ASideThatComesIntoViewIsNoMotion) {
     EXPECT_LT(displacement_log_odds(r, 1.0), 0.5);
 }
 
+TEST(RegisteredDisplacement, WhatStandsLiesWhereItWasAndItsMiddleDoes) {
+    const auto registered = [](const Surface& before, const Surface& now) {
+        return register_displacement(see(before), see(now), Eigen::Vector2d::Zero());
+    };
+    const auto stayed = registered(pillar(5.0, 0.0), pillar(5.01, -0.01));
+    EXPECT_GT(stayed.in_place_every_way, 0.9);
+    EXPECT_TRUE(stands(stayed, 0.5, 0.3, 0.02));
+    EXPECT_FALSE(stands(stayed, 0.5, 0.3, 0.4));
+    EXPECT_FALSE(stands(stayed, 0.1, 0.3, 0.0));  // so slow a motion would not show yet
+    EXPECT_FALSE(stands(registered(pillar(5.0, 0.0), pillar(5.0, 0.25)), 0.5, 0.3, 0.02));
+    // A pane stands where what it shows does; a bus that passes lies in its own plane, too.
+    const auto pane = registered(wall_strip(6.0, -1.0, 0.0), wall_strip(6.0, -0.9, 0.1));
+    EXPECT_LT(pane.in_place_every_way, 0.5);
+    EXPECT_TRUE(stands(pane, 0.5, 0.3, 0.1));
+    EXPECT_FALSE(stands(pane, 0.5, 0.3, 2.0));
+    // A part of it shows something behind it now: the rest has stayed.
+    const auto through = registered(pillar(5.0, 0.0), [](double azimuth, double elevation) {
+        return pillar(elevation > 0.14 ? 5.5 : 5.0, 0.0)(azimuth, elevation);
+    });
+    EXPECT_LT(through.in_place, 0.8);
+    EXPECT_TRUE(stands(through, 0.5, 0.3, 0.02));
+}
+
 TEST(RegisteredDisplacement, TooFewPointsSayNothing) {
     PointSample few = see(pillar(5.0, 0.0));
     few.size = 5;
