@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <numbers>
 
 #include "core/types/multiversion.hpp"
@@ -31,15 +33,32 @@ constexpr double kMostVariance = 9.0;
 constexpr int kLanes = 8;
 using Lanes = float __attribute__((vector_size(kLanes * sizeof(float)), aligned(alignof(float)), may_alias));
 
-/// Fits the windows of a row, `count` rounded up to whole lanes; pixels[k][i] is pixel k of window i.
+/// None of so many pixels has a return.
+inline bool is_empty(const float* pixels) {
+    std::uint64_t bits[kLanes * sizeof(float) / sizeof(std::uint64_t)];
+    std::memcpy(bits, pixels, sizeof(bits));
+    std::uint64_t any = 0;
+    for (const std::uint64_t pair : bits) any |= pair;
+    return any == 0;
+}
+
+/// Fits the windows of a row, `count` rounded up to whole lanes; pixels[k][i] is pixel k of window i, centre[i] the one
+/// in its centre.
 DLOD_MULTIVERSION
 void fit_windows(const float* const* __restrict pixels, const float (*__restrict weight)[kWindowPixels],
                  const float* __restrict scale, const float* __restrict azimuth, const float* __restrict altitude,
-                 int count, float* __restrict inverse, float* __restrict slope_azimuth,
+                 const float* __restrict centre, int count, float* __restrict inverse, float* __restrict slope_azimuth,
                  float* __restrict slope_altitude, float* __restrict deviation) {
     for (int start = 0; start < count; start += kLanes) {
+        if (is_empty(centre + start)) {
+            for (float* values : {inverse, slope_azimuth, slope_altitude, deviation}) {
+                *reinterpret_cast<Lanes*>(values + start) = Lanes{};
+            }
+            continue;
+        }
         Lanes a{}, b{}, g{}, squares{};
         Lanes low = *reinterpret_cast<const Lanes*>(pixels[0] + start);
+#pragma GCC unroll 5
         for (int k = 0; k < kWindowPixels; ++k) {
             const Lanes f = *reinterpret_cast<const Lanes*>(pixels[k] + start);
             a += weight[0][k] * f;
@@ -47,20 +66,24 @@ void fit_windows(const float* const* __restrict pixels, const float (*__restrict
             g += weight[2][k] * f;
             low = low < f ? low : f;
         }
+#pragma GCC unroll 5
         for (int k = 0; k < kWindowPixels; ++k) {
             const Lanes f = *reinterpret_cast<const Lanes*>(pixels[k] + start);
             const Lanes e = f * scale[k] - (a + azimuth[k] * b + altitude[k] * g);
             squares += e * e;
         }
-        *reinterpret_cast<Lanes*>(slope_azimuth + start) = b;
-        *reinterpret_cast<Lanes*>(slope_altitude + start) = g;
-        for (int l = 0; l < kLanes; ++l) {
-            const bool whole = low[l] > 0.0F && a[l] > kLeastInverse;
-            inverse[start + l] = whole ? a[l] : 0.0F;
-            // d(range) = d(inverse) / inverse^2
-            deviation[start + l] =
-                whole ? std::sqrt(squares[l] * (1.0F / static_cast<float>(kWindowPixels))) / (a[l] * a[l]) : 0.0F;
-        }
+        *reinterpret_cast<Lanes*>(inverse + start) = low > 0.0F ? a : Lanes{};
+        *reinterpret_cast<Lanes*>(slope_azimuth + start) = low > 0.0F ? b : Lanes{};
+        *reinterpret_cast<Lanes*>(slope_altitude + start) = low > 0.0F ? g : Lanes{};
+        *reinterpret_cast<Lanes*>(deviation + start) = squares;
+    }
+    for (int i = 0; i < count; ++i) {
+        const float a = inverse[i];
+        const bool whole = a > kLeastInverse;
+        // d(range) = d(inverse) / inverse^2
+        const float of_plane = std::sqrt(deviation[i] * (1.0F / static_cast<float>(kWindowPixels))) / (a * a);
+        inverse[i] = whole ? a : 0.0F;
+        deviation[i] = whole ? of_plane : 0.0F;
     }
 }
 
@@ -204,8 +227,9 @@ void PlaneWindows::fit_row(int row, PlaneRow& planes) const {
     const RowModel& model = model_[static_cast<std::size_t>(row)];
     const float* pixels[kWindowPixels];
     find_pixels(row, pixels);
-    fit_windows(pixels, model.weight, model.scale, model.azimuth, model.altitude, windows_, planes.inverse_range.data(),
-                planes.slope_azimuth.data(), planes.slope_altitude.data(), planes.deviation_m.data());
+    fit_windows(pixels, model.weight, model.scale, model.azimuth, model.altitude, pixels[centre_of(row)], windows_,
+                planes.inverse_range.data(), planes.slope_azimuth.data(), planes.slope_altitude.data(),
+                planes.deviation_m.data());
     const auto& usable = usable_[static_cast<std::size_t>(row)];
     for (std::size_t i = 0; i < count; ++i) {
         if (!usable[i]) planes.inverse_range[i] = 0.0F;
@@ -220,8 +244,7 @@ void PlaneWindows::fit_row(int row, PlaneRow& planes) const {
 void PlaneWindows::fit_partial(int row, int window, const float* const* pixels, PlaneRow& planes) const {
     const RowModel& model = model_[static_cast<std::size_t>(row)];
     const auto at = static_cast<std::size_t>(window);
-    const int centre = (row - model.first_row) * kWindowSide + kWindowRadius;
-    if (pixels[centre][at] <= 0.0F) return;
+    if (pixels[centre_of(row)][at] <= 0.0F) return;
     float inverse_depth[kWindowPixels];
     float weight[kWindowPixels];  // 1 of what came, else 0
     unsigned came = 0;            // bit by pixel
@@ -274,11 +297,8 @@ void PlaneWindows::fit_partial(int row, int window, const float* const* pixels, 
 }
 
 BeamFrame PlaneWindows::beam(int row, int measurement) const {
-    const auto r = static_cast<std::size_t>(row);
-    const auto m = static_cast<std::size_t>(measurement);
-    const RowModel& model = model_[r];
-    const float c = cos_azimuth_[m] * model.cos_offset - sin_azimuth_[m] * model.sin_offset;
-    const float s = sin_azimuth_[m] * model.cos_offset + cos_azimuth_[m] * model.sin_offset;
+    const RowModel& model = model_[static_cast<std::size_t>(row)];
+    const auto [c, s] = azimuth_of(model, measurement);
     BeamFrame frame;
     frame.direction =
         R_sensor_lidar_ * Eigen::Vector3f(c * model.cos_altitude, s * model.cos_altitude, model.sin_altitude);

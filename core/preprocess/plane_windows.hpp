@@ -8,6 +8,8 @@
 // spread enough to tell the plane.
 #pragma once
 
+#include <array>
+#include <utility>
 #include <vector>
 
 #include "core/types/frame.hpp"
@@ -65,6 +67,13 @@ class PlaneWindows {
     }
     /// @param measurement column in which the pixel was fired
     BeamFrame beam(int row, int measurement) const;
+    /// A vector of (direction, along_row, up) of a BeamFrame, in the lidar's axes.
+    std::array<float, 3> in_lidar_axes(int row, int measurement, const std::array<float, 3>& v) const {
+        const RowModel& model = model_[static_cast<std::size_t>(row)];
+        const auto [c, s] = azimuth_of(model, measurement);
+        const float out = v[0] * model.cos_altitude - v[2] * model.sin_altitude;
+        return {c * out + s * v[1], s * out - c * v[1], v[0] * model.sin_altitude + v[2] * model.cos_altitude};
+    }
     /// Of all whole windows whose centre lies in `row`.
     const WindowFiring& firing(int row) const { return model_[static_cast<std::size_t>(row)].firing; }
 
@@ -85,6 +94,16 @@ class PlaneWindows {
         float sin_offset = 0.0F;
     };
 
+    /// Cosine and sine of a beam's azimuth.
+    std::pair<float, float> azimuth_of(const RowModel& model, int measurement) const {
+        const auto m = static_cast<std::size_t>(measurement);
+        return {cos_azimuth_[m] * model.cos_offset - sin_azimuth_[m] * model.sin_offset,
+                sin_azimuth_[m] * model.cos_offset + cos_azimuth_[m] * model.sin_offset};
+    }
+    /// Place of the centre among a window's pixels.
+    int centre_of(int row) const {
+        return (row - model_[static_cast<std::size_t>(row)].first_row) * kWindowSide + kWindowRadius;
+    }
     /// First value of each pixel of a row's windows.
     void find_pixels(int row, const float* (&pixels)[kWindowPixels]) const;
     void fit_partial(int row, int window, const float* const* pixels, PlaneRow& planes) const;

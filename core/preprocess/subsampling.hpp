@@ -11,8 +11,8 @@ namespace dlod {
 struct SubsamplingConfig {
     int rows = 32;
     int column_step = 4;
-    int rough_step = 1;
     int points = 3000;
+    int rough_points = 6000;
     int least_points = 2500;
     double spacing_m = 0.12;
     double min_range_m = 0.5;
@@ -27,10 +27,10 @@ struct SubsamplingConfig {
                     "more rows make up for them");
         v.parameter("column_step", column_step, Range{1, 64}, "columns",
                     "every n-th of 1024 columns is a candidate; finer images have no more of them");
-        v.parameter("rough_step", rough_step, Range{1, 16}, "candidates",
-                    "every n-th candidate of what is not flat; lower sees smaller moving objects");
         v.parameter("points", points, Range{200, 50000}, "points",
                     "flat points kept, evened out over the directions of their normals");
+        v.parameter("rough_points", rough_points, Range{200, 50000}, "points",
+                    "points kept of what is not flat, evenly over the image; more sees smaller moving objects");
         v.parameter(
             "least_points", least_points, Range{0, 50000}, "points",
             "with fewer flat points raw ones make up for them: many columns lost, or trees and bushes, between which "
@@ -69,17 +69,16 @@ class Subsampling {
         std::uint16_t measurement;
         std::uint16_t fired;     ///< column of the window's mean firing time
         std::uint8_t direction;  ///< bin of the normal
-        float planarity;
-        float x, y, z;  ///< smoothed along the beam
-        float nx, ny, nz;
-        float delay_s;     ///< time of the window's fit after the pixel's
-        float tx, ty, tz;  ///< gradient of the firing time over the window, s/m
+        std::int32_t partial;    ///< place of the window's firing in partial_; kWhole: that of its row
+        float inverse_range, slope_azimuth, slope_altitude, deviation_m;  ///< as in PlaneRow
         std::uint16_t place() const { return fired; }
     };
+    static constexpr std::int32_t kWhole = -1;
 
     int rows_of(const Frame& frame) const;
     void collect_row(const Frame& frame, int row);
     void thin_out();
+    void write_flat(const Frame& frame, const Flat& candidate, PointSelection& points, std::size_t at) const;
     void select(Frame& frame);
     template <class Candidate>
     void sort_by_firing(const std::vector<Candidate>& candidates);
@@ -90,10 +89,11 @@ class Subsampling {
     PlaneRow planes_;
     std::vector<Flat> flat_;
     std::vector<Rough> rough_;
-    int rows_;                          ///< with candidates, of a whole frame
-    int sent_columns_;                  ///< that a whole frame has
-    std::vector<std::uint32_t> order_;  ///< scratch of sort_by_firing
-    std::vector<std::uint32_t> next_;   ///< scratch of sort_by_firing
+    std::vector<WindowFiring> partial_;  ///< of the flat candidates of which columns are missing
+    int rows_;                           ///< with candidates, of a whole frame
+    int sent_columns_;                   ///< that a whole frame has
+    std::vector<std::uint32_t> order_;   ///< scratch of sort_by_firing
+    std::vector<std::uint32_t> next_;    ///< scratch of sort_by_firing
 };
 
 }  // namespace dlod

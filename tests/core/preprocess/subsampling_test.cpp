@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <numeric>
 #include <set>
 #include <tuple>
 
@@ -62,7 +63,7 @@ SubsamplingConfig all_candidates() {
     config.points = 50000;
     config.least_points = 0;
     config.spacing_m = 0.0;
-    config.rough_step = 1;
+    config.rough_points = 50000;
     return config;
 }
 
@@ -240,6 +241,29 @@ TEST(Subsampling, FewPointsOfARareDirectionAreAllKept) {
     EXPECT_LE(flat, 600U);
     EXPECT_GT(flat, 500U);
     EXPECT_LT(flat, without_budget / 2);
+}
+
+TEST(Subsampling, OfWhatIsNotFlatNoMoreIsTakenThanToldFromAllAround) {
+    Room room(resolution(64, 1024));
+    SubsamplingConfig config = all_candidates();
+    config.rows = 64;
+    config.column_step = 1;
+    // By sixteenths of the turn.
+    const auto rough = [&] {
+        std::array<int, 16> count{};
+        const PointSelection& points = room.select(config);
+        for (std::size_t i = 0; i < points.size(); ++i) {
+            if (normal(points, i).isZero()) ++count[points.pixel[i] % 1024 / 64];
+        }
+        return count;
+    };
+    const auto sum = [](const std::array<int, 16>& count) { return std::accumulate(count.begin(), count.end(), 0); };
+    const auto all = rough();
+    ASSERT_GT(sum(all), 4000);
+    config.rough_points = sum(all) / 5;
+    const auto few = rough();
+    EXPECT_EQ(sum(few), config.rough_points);
+    for (std::size_t k = 0; k < few.size(); ++k) EXPECT_NEAR(few[k], all[k] / 5, 5 + all[k] / 50) << k;
 }
 
 TEST(Subsampling, NearSurfacesAreThinnedToTheSpacing) {
