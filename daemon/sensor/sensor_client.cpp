@@ -23,6 +23,41 @@ constexpr const char* kConfigPath = "/api/v1/sensor/config?reinit=true&persist=f
 constexpr std::size_t kMaxAnswer = 4U << 20U;  // metadata are about 10 kB
 constexpr int kMostTimeouts = 5;               // for an answer that comes little by little
 
+/// Without port and brackets.
+std::string name_of(const std::string& host) {
+    if (!host.empty() && host.front() == '[') return host.substr(1, host.find(']') - 1);
+    const auto colon = host.find(':');
+    return colon == host.rfind(':') ? host.substr(0, colon) : host;
+}
+
+/// The host's first address; nothing, and why, where the name cannot be resolved.
+std::optional<driver::SocketAddress> resolve(const std::string& host, std::string* why = nullptr) {
+    addrinfo hints{};
+    hints.ai_socktype = SOCK_DGRAM;
+    addrinfo* first = nullptr;
+    if (const int error = ::getaddrinfo(name_of(host).c_str(), "80", &hints, &first); error != 0) {
+        if (why != nullptr) *why = ::gai_strerror(error);
+        return std::nullopt;
+    }
+    const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> found(first, &::freeaddrinfo);
+    driver::SocketAddress address;
+    std::memcpy(&address.storage, found->ai_addr, found->ai_addrlen);
+    address.length = found->ai_addrlen;
+    return address;
+}
+
+/// Why there is no answer, and what to do.
+std::string without_answer(const std::string& host, httplib::Error error) {
+    std::string why;
+    if (error == httplib::Error::Connection && !resolve(host, &why)) {
+        return "the name cannot be resolved: " + why +
+               " (names in .local need mDNS: apt install avahi-daemon libnss-mdns; or give the address)";
+    }
+    const bool no_connection = error == httplib::Error::Connection || error == httplib::Error::ConnectionTimeout;
+    return (no_connection ? "no connection" : "no answer: " + httplib::to_string(error)) +
+           " (is the sensor powered and connected, and sensor.host right?)";
+}
+
 /// The body of a good answer, else a SensorError that says what the sensor said. Reads no more than an Ouster would
 /// send, for no longer than it could take.
 std::string request(const std::string& host, std::chrono::milliseconds timeout, const std::string& method,
@@ -46,10 +81,7 @@ std::string request(const std::string& host, std::chrono::milliseconds timeout, 
 
     const std::string what = "sensor " + host + ": " + method + " " + path;
     if (answer.size() > kMaxAnswer) throw SensorError(what + ": answer too large to be an Ouster's");
-    if (!result) {
-        throw SensorError(what + ": " + httplib::to_string(result.error()) +
-                          " (is the sensor powered and connected, and sensor.host right?)");
-    }
+    if (!result) throw SensorError(what + ": " + without_answer(host, result.error()));
     if (result->status != 200) {
         // A page for people says no more than its title.
         const bool is_page = answer.starts_with('<');
@@ -128,21 +160,8 @@ SensorSettings SensorClient::fetch_settings() const {
 }
 
 std::string SensorClient::own_address() const {
-    std::string name = host_;
-    if (!name.empty() && name.front() == '[') {
-        name = name.substr(1, name.find(']') - 1);
-    } else if (const auto colon = name.find(':'); colon == name.rfind(':')) {
-        name = name.substr(0, colon);
-    }
-    addrinfo hints{};
-    hints.ai_socktype = SOCK_DGRAM;
-    addrinfo* first = nullptr;
-    if (::getaddrinfo(name.c_str(), "80", &hints, &first) != 0) return "";
-    const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> found(first, &::freeaddrinfo);
-    driver::SocketAddress sensor;
-    std::memcpy(&sensor.storage, found->ai_addr, found->ai_addrlen);
-    sensor.length = found->ai_addrlen;
-    const auto own = driver::source_address_for(sensor);
+    const auto sensor = resolve(host_);
+    const auto own = sensor ? driver::source_address_for(*sensor) : std::nullopt;
     return own ? driver::to_string(*own) : "";
 }
 

@@ -102,7 +102,12 @@ TEST(SensorClient, WhatIsNoOusterIsSaidSo) {
 
 TEST(SensorClient, AnAbsentSensorIsAnErrorWithinTheTimeout) {
     const auto begin = std::chrono::steady_clock::now();
-    EXPECT_NE(error_of(SensorClient("127.0.0.1:1", milliseconds(300))).find("127.0.0.1:1"), std::string::npos);
+    const std::string absent = error_of(SensorClient("127.0.0.1:1", milliseconds(300)));
+    EXPECT_NE(absent.find("127.0.0.1:1"), std::string::npos) << absent;
+    EXPECT_NE(absent.find("no connection"), std::string::npos) << absent;
+    const std::string unknown = error_of(SensorClient("os-1..local:80", milliseconds(300)));
+    EXPECT_NE(unknown.find("cannot be resolved"), std::string::npos) << unknown;
+    EXPECT_NE(unknown.find("libnss-mdns"), std::string::npos) << unknown;
     EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(3));
 }
 
