@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <csignal>
 #include <cstdlib>
 #include <utility>
 
@@ -33,6 +34,8 @@ std::string state_directory() {
 }  // namespace
 
 LiveService::LiveService(const ConfigSources& sources) : sources_(sources), config_(load_config(sources, nullptr)) {
+    // A sensor that hangs up in mid-request, or who read the log and has gone, is an error of the write, not the end.
+    std::signal(SIGPIPE, SIG_IGN);
     set_up_log(config_.log.level);
     start_.start_ns = StepTimer::now_ns(CLOCK_MONOTONIC);
     start_.is_service = service_.is_service();
