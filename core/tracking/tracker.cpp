@@ -18,6 +18,7 @@ namespace {
 
 constexpr double kSimilar = 1.5;        // ratio of footprint diagonals
 constexpr double kFree = 0.5;           // evidence of a part that stands where it was free
+constexpr int kKnownHits = 8;           // from which on the extent of an object says what is a part of it
 constexpr double kSameFootprint = 0.4;  // parts above one another share that much of the smaller footprint
 constexpr double kMaxGap_m = 0.5;       // and are at most that far apart in height
 constexpr double kDuplicate = 0.6;      // an unseen track that shares that much with a seen one is the same object
@@ -57,6 +58,7 @@ struct Tracker::State {
     void give_way(std::size_t guest, TrackedObject& host, std::vector<OrientedBox>& cleared);
     void join_pieces(Frame& frame);
     void attach_parts(Frame& frame);
+    void attach_to_young(Frame& frame);
     void see_and_miss(Frame& frame);
     void give_birth(Frame& frame);
     void publish(Frame& frame);
@@ -106,6 +108,7 @@ void Tracker::process(Frame& frame) {
         state_->associate(frame);
         state_->join_pieces(frame);
         state_->attach_parts(frame);
+        state_->attach_to_young(frame);
         state_->see_and_miss(frame);
         state_->give_birth(frame);
     }
@@ -202,6 +205,27 @@ void Tracker::State::attach_parts(Frame& frame) {
         limb[d] = best.limb ? 1 : 0;
         if (own >= 0 && owner[d] != own) {
             give_way(static_cast<std::size_t>(own), *object(owner[d]), frame.detection.cleared);
+        }
+    }
+}
+
+// Of a vehicle that comes into view from behind something now these, now those pieces are seen.
+void Tracker::State::attach_to_young(Frame& frame) {
+    const auto& detections = frame.detection.detections;
+    const auto free = [&](std::size_t d) { return candidates[d].motion > kFree && !merged.is_apart(d); };
+    const auto object = [&](int track) -> const TrackedObject& { return objects[static_cast<std::size_t>(track)]; };
+    for (std::size_t d = 0; d < detections.size(); ++d) {
+        const int own = owner[d];
+        if (!free(d) || (own >= 0 && object(own).steady())) continue;
+        for (std::size_t h = 0; h < detections.size(); ++h) {
+            const int host = owner[h];
+            if (host < 0 || host == own || !free(h)) continue;
+            if (object(host).hits() >= kKnownHits || object(host).state() == DynamicState::kStatic) continue;
+            if (own >= 0 && !object(host).goes_before(object(own))) continue;
+            if (!may_be_one_vehicle(detections[h], detections[d], frame, projection)) continue;
+            owner[d] = host;
+            if (own >= 0) absorbed[static_cast<std::size_t>(own)] = 1;
+            break;
         }
     }
 }
@@ -311,10 +335,12 @@ void Tracker::State::give_birth(Frame& frame) {
         owner[d] = t;
         for (std::size_t j = i + 1; j < strays.size(); ++j) {
             const OrientedBox& part = detections[strays[j]].box;
-            if (owner[strays[j]] < 0 && shared_footprint(detections[d].box, part) > kSameFootprint &&
-                height_gap_m(detections[d].box, part) < kMaxGap_m) {
-                owner[strays[j]] = t;
-            }
+            if (owner[strays[j]] >= 0) continue;
+            const bool stacked = shared_footprint(detections[d].box, part) > kSameFootprint &&
+                                 height_gap_m(detections[d].box, part) < kMaxGap_m;
+            const bool pieces = candidates[d].motion > kFree && candidates[strays[j]].motion > kFree &&
+                                may_be_one_vehicle(detections[d], detections[strays[j]], frame, projection);
+            if (stacked || pieces) owner[strays[j]] = t;
         }
         objects.emplace_back(next_id++, frame, shapes, sighting_of(frame, static_cast<std::size_t>(t)), config);
     }

@@ -39,6 +39,11 @@ constexpr double kBumperHeight_m = 1.0;
 constexpr double kFront_m = 0.8;
 constexpr double kBehind_m = 1.0;  // what is farther than both pieces is seen between them
 constexpr int kPlaces = 5;
+constexpr double kAbove_m = 0.8;      // one piece is no more above another
+constexpr double kBody_m = 1.2;       // people are no broader,
+constexpr double kTall_m = 0.8;       // and no lower,
+constexpr double kCyclist_m = 1.8;    // cyclists no longer,
+constexpr double kUpright = 1.25;     // nor than so many times their height
 constexpr double kReflected_m = 1.5;  // what glass shows seems to be that much beyond the vehicle's end at most
 constexpr double kFringe = 0.01;      // of tangents: edges are seen within a beam or two
 
@@ -83,7 +88,7 @@ bool seen_through(const Detection& vehicle, const Detection& inner, const Detect
     return outline(vehicle).encloses(outline(inner));
 }
 
-/// Whether something farther than both is seen between two detections.
+/// Whether the ground, or something farther than both, is seen between two detections.
 bool gap_between(const Detection& a, const Detection& b, const Frame& frame, const SweepProjection& projection) {
     const Eigen::Vector3d sensor = frame.odometry.T_world_sensor.translation();
     const double farther = std::max((a.centroid_m - sensor).norm(), (b.centroid_m - sensor).norm()) + kBehind_m;
@@ -91,7 +96,9 @@ bool gap_between(const Detection& a, const Detection& b, const Frame& frame, con
     for (int k = 1; k <= kPlaces; ++k) {
         const double share = static_cast<double>(k) / (kPlaces + 1);
         const auto seen = projection.project((1.0 - share) * a.centroid_m + share * b.centroid_m);
-        if (seen && frame.cloud.range_m(seen->pixel.row, seen->pixel.column) > farther) ++behind;
+        if (!seen) continue;
+        const auto [row, column] = seen->pixel;
+        if (frame.cloud.range_m(row, column) > farther || frame.prepared.ground(row, column) != 0) ++behind;
     }
     return 2 * behind > kPlaces;
 }
@@ -170,6 +177,18 @@ bool pieces_of_one_vehicle(const TrackedObject& a, const Detection& seen_a, cons
     const Eigen::Vector2d across(-std::sin(yaw), std::cos(yaw));
     if (speed < (larger ? kDriving_mps : kRunning_mps) && !are_front(a.box(), b.box(), across)) return false;
     return !gap_between(seen_a, seen_b, frame, projection);
+}
+
+bool may_be_one_vehicle(const Detection& a, const Detection& b, const Frame& frame, const SweepProjection& projection) {
+    const Eigen::Vector2d between = (b.box.center_m - a.box.center_m).head<2>();
+    if (between.squaredNorm() > kLongest_m * kLongest_m || height_gap_m(a.box, b.box) > kAbove_m) return false;
+    const auto upright = [](const OrientedBox& box) {
+        return box.size_m.z() > kTall_m && box.longest_m() < std::min(kCyclist_m, kUpright * box.size_m.z());
+    };
+    if (upright(a.box) || upright(b.box)) return false;
+    const Eigen::Vector2d joint_m = joint_size(a.box, b.box, std::atan2(between.y(), between.x()));
+    return joint_m.x() > kBody_m && joint_m.x() < kLongest_m && joint_m.y() < kWidest_m &&
+           !gap_between(a, b, frame, projection);
 }
 
 }  // namespace dlod

@@ -36,4 +36,10 @@ bool pieces_of_one_vehicle(const TrackedObject& a, const Detection& seen_a, cons
                            const Detection& seen_b, const Frame& frame, const DetectionShapes& shapes,
                            const SweepProjection& projection);
 
+/// Two detections, both where it was free, that may be pieces of one vehicle of which nobody knows more yet: together
+/// they are no larger than a car or a van and broader than people, neither is as tall and narrow as people and cyclists
+/// are, and neither the ground nor anything behind is seen between them.
+/// @param projection set to the frame's pose
+bool may_be_one_vehicle(const Detection& a, const Detection& b, const Frame& frame, const SweepProjection& projection);
+
 }  // namespace dlod

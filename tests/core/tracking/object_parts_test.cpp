@@ -152,6 +152,37 @@ TEST_F(ObjectPartsTest, WhatIsSeenThroughTheWindscreenBelongsToTheVan) {
     }
 }
 
+// Of a vehicle that comes into view from behind another one these pieces are seen, then those.
+TEST_F(ObjectPartsTest, PiecesOfAVehicleThatComesIntoViewAreOneTrack) {
+    Tracker tracker(sensor, config);
+    const auto add_piece = [&](double x, double y, double height_m) {
+        Cylinder piece = person(x, y);
+        piece.radius_m = 0.5;
+        piece.height_m = height_m;
+        scene.add(piece);
+    };
+    for (int k = 0; k < 8; ++k) {
+        scene.next();
+        const double x = 30.0 - 1.0 * k;
+        add_piece(x + (k % 2 == 0 ? 0.0 : 1.2), 0.0, 0.6);
+        if (k > 0) add_piece(x + 2.0, k % 2 == 0 ? -0.6 : 0.6, 0.7);
+        if (k > 1) add_piece(x + 3.4, 0.3, 0.5);
+        tracker.process(scene.frame);
+        ASSERT_EQ(scene.frame.detection.tracks.size(), 1U) << k;
+        EXPECT_EQ(scene.frame.detection.tracks[0].id, 1U) << k;
+    }
+}
+
+TEST_F(ObjectPartsTest, PeopleWhoComeIntoViewTogetherAreNoPieces) {
+    Tracker tracker(sensor, config);
+    for (int k = 0; k < 8; ++k) {
+        scene.next();
+        for (const double y : {-0.9, 0.0, 0.9}) scene.add(person(12.0 - 0.13 * k, y));
+        tracker.process(scene.frame);
+        ASSERT_EQ(scene.frame.detection.tracks.size(), 3U) << k;
+    }
+}
+
 TEST_F(ObjectPartsTest, ADogBeforeItsOwnerKeepsItsTrack) {
     Tracker tracker(sensor, config);
     for (int k = 0; k < 30; ++k) {
