@@ -8,9 +8,13 @@
 #include <set>
 #include <sstream>
 #include <utility>
+#include <vector>
 
 namespace dlod::daemon {
 namespace {
+
+/// Of a file that is no configuration at all, the first ones are enough.
+constexpr std::size_t kMostProblems = 20;
 
 [[noreturn]] void fail(const std::string& name, const YAML::Mark& mark, const std::string& message) {
     if (mark.is_null()) throw ConfigError(fmt::format("{}: {}", name, message));
@@ -61,12 +65,15 @@ void with_context(const Option& option, const std::string& place, F&& assign) {
     }
 }
 
-void apply_map(const OptionList& options, const YAML::Node& map, const std::string& prefix, const std::string& name) {
+/// What is wrong with a key does not keep the others from being looked at.
+/// @param problems gets a line for each
+void apply_map(const OptionList& options, const YAML::Node& map, const std::string& prefix, const std::string& name,
+               std::vector<std::string>& problems) {
     if (!map.IsMap())
         fail(name, map.Mark(),
              prefix.empty() ? "not a list of 'key: value'" : fmt::format("{}: expected keys below it", prefix));
     std::set<std::string> seen;
-    for (const auto& entry : map) {
+    const auto apply = [&](const auto& entry) {
         if (!entry.first.IsScalar()) fail(name, entry.first.Mark(), "a key must be a word");
         const std::string key = prefix.empty() ? entry.first.Scalar() : prefix + "." + entry.first.Scalar();
         const auto mark = entry.first.Mark();
@@ -75,9 +82,16 @@ void apply_map(const OptionList& options, const YAML::Node& map, const std::stri
         if (const Option* option = find_option(options, key)) {
             with_context(*option, place, [&] { assign_node(*option, entry.second); });
         } else if (is_group(options, key)) {
-            if (!entry.second.IsNull()) apply_map(options, entry.second, key, name);
+            if (!entry.second.IsNull()) apply_map(options, entry.second, key, name, problems);
         } else {
             fail_unknown(options, place, key);
+        }
+    };
+    for (const auto& entry : map) {
+        try {
+            apply(entry);
+        } catch (const ConfigError& error) {
+            if (problems.size() < kMostProblems) problems.emplace_back(error.what());
         }
     }
 }
@@ -107,14 +121,16 @@ std::string comment(const std::string& text, const std::string& indent) {
 
 void apply_yaml(Config& config, const std::string& yaml, const std::string& name) {
     const OptionList options = list_options(config);
+    std::vector<std::string> problems;
     try {
         const YAML::Node root = YAML::Load(yaml);
-        if (!root.IsNull()) apply_map(options, root, "", name);
+        if (!root.IsNull()) apply_map(options, root, "", name, problems);
     } catch (const YAML::Exception& error) {
         const bool tabs = yaml.find("\n\t") != std::string::npos;
         fail(name, error.mark,
              fmt::format("not valid YAML: {}{}", error.msg, tabs ? "; indent with spaces, not tabs" : ""));
     }
+    if (!problems.empty()) throw ConfigError(fmt::format("{}", fmt::join(problems, "\n")));
 }
 
 void apply_file(Config& config, const std::filesystem::path& file) {

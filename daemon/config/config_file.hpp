@@ -14,8 +14,8 @@ namespace dlod::daemon {
 
 /// Applies YAML text to `config`; keys that it does not name keep their values.
 /// @param name of the file, for messages
-/// @throws ConfigError for bad syntax, an unknown or repeated key, a value out of range: "NAME:LINE: KEY: what is
-/// wrong"
+/// @throws ConfigError for bad syntax, unknown or repeated keys, values out of range: "NAME:LINE: KEY: what is wrong",
+/// a line for each
 void apply_yaml(Config& config, const std::string& yaml, const std::string& name);
 
 /// As apply_yaml, of a file. @throws ConfigError also when it cannot be read

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <sstream>
 
@@ -91,6 +92,17 @@ TEST(ConfigFile, ErrorsNameFileLineAndKey) {
     EXPECT_TRUE(has(error_of("- 1\n- 2\n"), {"robot.yaml:1"}));
     EXPECT_TRUE(has(error_of("pipeline:\n  threads: [1\n"), {"robot.yaml:", "not valid YAML"}));
     EXPECT_TRUE(has(error_of("pipeline:\n  threads:\n"), {"robot.yaml:2", "pipeline.threads", "no value"}));
+}
+
+TEST(ConfigFile, AllThatIsWrongIsNamedAtOnceAndALine) {
+    const std::string error =
+        error_of("pipeline:\n  threads: 0\n  waiting_frames: many\nsensr: {host: a}\nodometry: {use_imu: maybe}\n");
+    EXPECT_TRUE(has(error, {"robot.yaml:2: pipeline.threads", "\nrobot.yaml:3: pipeline.waiting_frames",
+                            "\nrobot.yaml:4: unknown key 'sensr'", "\nrobot.yaml:5: odometry.use_imu"}));
+    std::string garbage;
+    for (int i = 0; i < 1000; ++i) garbage += fmt::format("key{}: 1\n", i);
+    const std::string errors = error_of(garbage);
+    EXPECT_EQ(std::count(errors.begin(), errors.end(), '\n'), 19) << "the first ones are enough";
 }
 
 TEST(ConfigFile, AFileThatCannotBeReadIsNamed) {
