@@ -88,10 +88,11 @@ void apply_map(const OptionList& options, const YAML::Node& map, const std::stri
         }
     };
     for (const auto& entry : map) {
+        if (problems.size() == kMostProblems) return;
         try {
             apply(entry);
         } catch (const ConfigError& error) {
-            if (problems.size() < kMostProblems) problems.emplace_back(error.what());
+            problems.emplace_back(error.what());
         }
     }
 }
