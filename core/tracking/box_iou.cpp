@@ -101,17 +101,6 @@ Footprint::Footprint(const OrientedBox& box)
       half_length_m_(0.5 * box.size_m.x()),
       half_width_m_(0.5 * box.size_m.y()) {}
 
-Eigen::Vector2d Footprint::beyond(const Eigen::Vector3d& point_m) const {
-    const Eigen::Vector3d d = point_m - center_m_;
-    return {std::max(0.0, std::abs(cosine_ * d.x() + sine_ * d.y()) - half_length_m_),
-            std::max(0.0, std::abs(-sine_ * d.x() + cosine_ * d.y()) - half_width_m_)};
-}
-
-double Footprint::distance_m(const Eigen::Vector3d& point_m) const {
-    const Eigen::Vector2d out = beyond(point_m);
-    return out.x() == 0.0 || out.y() == 0.0 ? out.maxCoeff() : std::hypot(out.x(), out.y());
-}
-
 double footprint_distance_m(const OrientedBox& box, const Eigen::Vector3d& point_m) {
     return Footprint(box).distance_m(point_m);
 }

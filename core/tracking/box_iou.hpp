@@ -1,6 +1,9 @@
 // Intersection over union of upright boxes (d_1 of Eq. 5), and how else two boxes lie to one another.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+
 #include "core/types/oriented_box.hpp"
 
 namespace dlod {
@@ -22,12 +25,19 @@ class Footprint {
   public:
     explicit Footprint(const OrientedBox& box);
     /// Distance [m] in the ground plane to a point, 0 inside.
-    double distance_m(const Eigen::Vector3d& point_m) const;
+    double distance_m(const Eigen::Vector3d& point_m) const {
+        const Eigen::Vector2d out = beyond(point_m);
+        return out.x() == 0.0 || out.y() == 0.0 ? out.maxCoeff() : out.norm();
+    }
     bool contains(const Eigen::Vector3d& point_m) const { return beyond(point_m).isZero(0.0); }
 
   private:
     /// How far the point lies beyond the sides, along and across.
-    Eigen::Vector2d beyond(const Eigen::Vector3d& point_m) const;
+    Eigen::Vector2d beyond(const Eigen::Vector3d& point_m) const {
+        const Eigen::Vector3d d = point_m - center_m_;
+        return {std::max(0.0, std::abs(cosine_ * d.x() + sine_ * d.y()) - half_length_m_),
+                std::max(0.0, std::abs(-sine_ * d.x() + cosine_ * d.y()) - half_width_m_)};
+    }
 
     Eigen::Vector3d center_m_;
     double cosine_, sine_, half_length_m_, half_width_m_;

@@ -117,7 +117,9 @@ bool MergedDetections::share_out(const Detection& whole, const DetectionShapes& 
         for (std::size_t k = 0; k < covered_.size(); ++k) {
             const OrientedBox& box = tracks[covered_[k]].visible;
             // Inside of several boxes, the nearer middle decides.
-            const double distance = footprints_[k].distance_m(p) + 0.2 * (box.center_m - p).head<2>().norm();
+            const double from_middle = 0.2 * (box.center_m - p).head<2>().norm();
+            if (k > 0 && from_middle >= best) continue;
+            const double distance = footprints_[k].distance_m(p) + from_middle;
             if (k == 0 || distance < best) {
                 best = distance;
                 owner_[i] = k;
