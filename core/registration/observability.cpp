@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace dlod {
@@ -15,6 +16,10 @@ constexpr float kFacingLever = 0.1F;
 // As many facing matches make a direction observable. In a bare tunnel there is none; how much they say is weighed
 // against the prediction by their information.
 constexpr double kFacingMatches = 5.0;
+// Up to so many are looked at closely. Wherever the pose is, all matches of a surface are about equally far from it:
+// those that scatter by more than this lie on an edge, whose voxel's one plane is tilted at random, or on people.
+constexpr std::size_t kFewMatches = 64;
+constexpr float kScatter_m = 0.05F;
 // A match so many standard deviations from what the prediction says has a quarter of its weight.
 constexpr float kSurprise = 2.0F;
 // With less than this share of those matches' weight left the prediction is not believed.
@@ -30,6 +35,29 @@ bool faces(const PlaneMatches& matches, std::size_t i, int block, float along) {
     return block == 0 ? Observability::is_facing(along) : std::abs(along) > kFacingLever * matches.lever_m[i];
 }
 
+/// Number of matches that face a direction and, where these are few, agree with the others on their surface.
+double facing_matches(const PlaneMatches& matches, int block, const Eigen::Vector3f& u) {
+    std::array<std::size_t, kFewMatches> few;
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < matches.count; ++i) {
+        if (!faces(matches, i, block, part_along(matches, i, block, u))) continue;
+        if (count < kFewMatches) few[count] = i;
+        ++count;
+    }
+    if (count > kFewMatches) return static_cast<double>(count);
+    const auto agrees = [&](std::size_t i) {
+        float sum = 0.0F;
+        float on_surface = 0.0F;
+        for (std::size_t k = 0; k < count; ++k) {
+            if (matches.surface[few[k]] != matches.surface[i]) continue;
+            sum += matches.residual[few[k]];
+            on_surface += 1.0F;
+        }
+        return std::abs(matches.residual[i] - sum / on_surface) < kScatter_m;
+    };
+    return static_cast<double>(std::count_if(few.begin(), few.begin() + count, agrees));
+}
+
 }  // namespace
 
 Observability Observability::of(const PlaneMatches& matches, const NormalEquations& equations, double demand) {
@@ -42,11 +70,7 @@ Observability Observability::of(const PlaneMatches& matches, const NormalEquatio
         for (int k = 0; k < 3; ++k) {
             if (solver.eigenvalues()[k] > kClearShare * solver.eigenvalues()[2]) break;
             const Eigen::Vector3f u = solver.eigenvectors().col(k).cast<float>();
-            double facing = 0.0;
-            for (std::size_t i = 0; i < matches.count; ++i) {
-                facing += faces(matches, i, block, part_along(matches, i, block, u)) ? 1.0 : 0.0;
-            }
-            if (facing >= least) {
+            if (facing_matches(matches, block, u) >= least) {
                 result.weak_[static_cast<std::size_t>(result.weak_count_++)] = {u, block};
             } else {
                 result.directions_.block<3, 1>(block, result.unobservable_++) = solver.eigenvectors().col(k);

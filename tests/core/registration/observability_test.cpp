@@ -123,6 +123,18 @@ TEST(Observability, AFewDozenPointsOfAnEndWallAreEvidence) {
     EXPECT_EQ(look(matches).unobservable(), 0);
 }
 
+// A voxel at an edge of a tunnel has one plane, tilted at random; what matches it lies off it by more or less.
+TEST(Observability, MatchesThatDisagreeOnTheirSurfaceAreNoEvidence) {
+    auto matches = matches_of_passage_with_end_wall();
+    for (std::uint32_t i = 0; i < 30; ++i) {
+        matches.surface[i] = i % 4;
+        matches.residual[i] = 0.2F;
+    }
+    EXPECT_EQ(look(matches).unobservable(), 0) << "all are as far off as the pose is";
+    for (std::uint32_t i = 0; i < 30; ++i) matches.residual[i] = i % 8 < 4 ? -0.08F : 0.08F;
+    EXPECT_EQ(look(matches).unobservable(), 1);
+}
+
 TEST(Observability, AFewFacingMatchesAreHeardWithoutTheNoiseOfTheOthers) {
     auto matches = matches_of_passage_with_end_wall();
     const Observability o = look(matches);
