@@ -28,6 +28,10 @@ constexpr float kMissing = -1.0F;
 // fit, and the slopes may be so many times less certain than those of a whole one, as variances.
 constexpr int kLeastLines = 3;
 constexpr double kMostVariance = 9.0;
+// Windows of five rows are no higher than this, a little more than those of an OS0 with 64 rows. With 32 rows, three
+// degrees apart, five would have to lie on 2 m of one wall at 10 m: little but the ground was flat, and poses were
+// lost.
+constexpr double kHighestWindow_rad = 0.12;
 
 /// Eight windows side by side, in registers.
 constexpr int kLanes = 8;
@@ -47,8 +51,8 @@ inline bool is_empty(const float* pixels) {
 DLOD_MULTIVERSION
 void fit_windows(const float* const* __restrict pixels, const float (*__restrict weight)[kWindowPixels],
                  const float* __restrict scale, const float* __restrict azimuth, const float* __restrict altitude,
-                 const float* __restrict centre, int count, float* __restrict inverse, float* __restrict slope_azimuth,
-                 float* __restrict slope_altitude, float* __restrict deviation) {
+                 const float* __restrict centre, int window_pixels, int count, float* __restrict inverse,
+                 float* __restrict slope_azimuth, float* __restrict slope_altitude, float* __restrict deviation) {
     for (int start = 0; start < count; start += kLanes) {
         if (is_empty(centre + start)) {
             for (float* values : {inverse, slope_azimuth, slope_altitude, deviation}) {
@@ -59,7 +63,7 @@ void fit_windows(const float* const* __restrict pixels, const float (*__restrict
         Lanes a{}, b{}, g{}, squares{};
         Lanes low = *reinterpret_cast<const Lanes*>(pixels[0] + start);
 #pragma GCC unroll 5
-        for (int k = 0; k < kWindowPixels; ++k) {
+        for (int k = 0; k < window_pixels; ++k) {
             const Lanes f = *reinterpret_cast<const Lanes*>(pixels[k] + start);
             a += weight[0][k] * f;
             b += weight[1][k] * f;
@@ -67,7 +71,7 @@ void fit_windows(const float* const* __restrict pixels, const float (*__restrict
             low = low < f ? low : f;
         }
 #pragma GCC unroll 5
-        for (int k = 0; k < kWindowPixels; ++k) {
+        for (int k = 0; k < window_pixels; ++k) {
             const Lanes f = *reinterpret_cast<const Lanes*>(pixels[k] + start);
             const Lanes e = f * scale[k] - (a + azimuth[k] * b + altitude[k] * g);
             squares += e * e;
@@ -77,11 +81,12 @@ void fit_windows(const float* const* __restrict pixels, const float (*__restrict
         *reinterpret_cast<Lanes*>(slope_altitude + start) = low > 0.0F ? g : Lanes{};
         *reinterpret_cast<Lanes*>(deviation + start) = squares;
     }
+    const float share = 1.0F / static_cast<float>(window_pixels);
     for (int i = 0; i < count; ++i) {
         const float a = inverse[i];
         const bool whole = a > kLeastInverse;
         // d(range) = d(inverse) / inverse^2
-        const float of_plane = std::sqrt(deviation[i] * (1.0F / static_cast<float>(kWindowPixels))) / (a * a);
+        const float of_plane = std::sqrt(deviation[i] * share) / (a * a);
         inverse[i] = whole ? a : 0.0F;
         deviation[i] = whole ? of_plane : 0.0F;
     }
@@ -96,12 +101,18 @@ WindowFiring firing_of(const Eigen::Matrix<double, 3, 4>& fit) {
     return firing;
 }
 
+int rows_of_window(const SensorModel& sensor) {
+    return (kWindowSide - 1) * sensor.row_rad() > kHighestWindow_rad ? kLeastLines : kWindowSide;
+}
+
 }  // namespace
 
 PlaneWindows::PlaneWindows(const SensorModel& sensor, int column_step)
     : sensor_(sensor),
       column_step_(column_step),
       windows_(sensor.width / column_step),
+      window_rows_(rows_of_window(sensor)),
+      window_pixels_(window_rows_ * kWindowSide),
       R_sensor_lidar_(sensor.T_sensor_lidar.rotation().cast<float>()) {
     const int h = sensor.height;
     const int w = sensor.width;
@@ -125,15 +136,15 @@ PlaneWindows::PlaneWindows(const SensorModel& sensor, int column_step)
     usable_.resize(static_cast<std::size_t>(h));
     for (int row = 0; row < h; ++row) {
         RowModel& model = model_[static_cast<std::size_t>(row)];
-        model.first_row = std::clamp(row - kWindowRadius, 0, std::max(0, h - kWindowSide));
+        model.first_row = std::clamp(row - window_rows_ / 2, 0, std::max(0, h - window_rows_));
         const double alt0 = sensor.altitude_rad[static_cast<std::size_t>(row)];
         model.cos_altitude = static_cast<float>(std::cos(alt0));
         model.sin_altitude = static_cast<float>(std::sin(alt0));
         model.cos_offset = std::cos(sensor.azimuth_offset_rad[static_cast<std::size_t>(row)]);
         model.sin_offset = -std::sin(sensor.azimuth_offset_rad[static_cast<std::size_t>(row)]);
-        Eigen::Matrix<double, kWindowPixels, 3> X;
-        Eigen::Matrix<double, kWindowPixels, 4> fired;  // when, and from where
-        for (int k = 0; k < kWindowPixels; ++k) {
+        Eigen::Matrix<double, Eigen::Dynamic, 3, 0, kWindowPixels, 3> X(window_pixels_, 3);
+        Eigen::Matrix<double, Eigen::Dynamic, 4, 0, kWindowPixels, 4> fired(window_pixels_, 4);  // when, and from where
+        for (int k = 0; k < window_pixels_; ++k) {
             const int other = std::min(model.first_row + k / kWindowSide, h - 1);
             const double alt = sensor.altitude_rad[static_cast<std::size_t>(other)];
             const double azimuth = (k % kWindowSide - kWindowRadius + offset_of(other) - offset_of(row)) * per_column;
@@ -157,20 +168,20 @@ PlaneWindows::PlaneWindows(const SensorModel& sensor, int column_step)
             model.altitude[k] = static_cast<float>(X(k, 2));
         }
         const Eigen::Matrix3d covariance = (X.transpose() * X + 1e-12 * Eigen::Matrix3d::Identity()).inverse();
-        const Eigen::Matrix<double, 3, kWindowPixels> solver = covariance * X.transpose();
+        const Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, kWindowPixels> solver = covariance * X.transpose();
         model.firing = firing_of(solver * fired);
         for (int i = 0; i < 2; ++i) model.slope_variance[i] = covariance(i + 1, i + 1);
         for (int i = 0; i < 3; ++i) {
-            for (int k = 0; k < kWindowPixels; ++k) {
+            for (int k = 0; k < window_pixels_; ++k) {
                 model.weight[i][k] = static_cast<float>(solver(i, k)) * model.scale[k];
             }
         }
         auto& usable = usable_[static_cast<std::size_t>(row)];
-        usable.assign(static_cast<std::size_t>(windows_), h >= kWindowSide ? 1 : 0);
+        usable.assign(static_cast<std::size_t>(windows_), h >= window_rows_ ? 1 : 0);
         for (int i = 0; i < windows_; ++i) {
             int low = w;
             int high = -1;
-            for (int k = 0; k < kWindowPixels; ++k) {
+            for (int k = 0; k < window_pixels_; ++k) {
                 const int column = (i * column_step + k % kWindowSide - kWindowRadius + w) % w;
                 const int m = sensor.measurement_of(std::min(model.first_row + k / kWindowSide, h - 1), column);
                 low = std::min(low, m);
@@ -209,7 +220,7 @@ void PlaneWindows::load(const Frame& frame) {
 
 void PlaneWindows::find_pixels(int row, const float* (&pixels)[kWindowPixels]) const {
     const int first_row = model_[static_cast<std::size_t>(row)].first_row;
-    for (int k = 0; k < kWindowPixels; ++k) {
+    for (int k = 0; k < window_pixels_; ++k) {
         const int offset = k % kWindowSide - kWindowRadius;
         const int turns = offset >= 0 ? offset / column_step_ : -((column_step_ - 1 - offset) / column_step_);
         const int part = offset - turns * column_step_;
@@ -227,9 +238,9 @@ void PlaneWindows::fit_row(int row, PlaneRow& planes) const {
     const RowModel& model = model_[static_cast<std::size_t>(row)];
     const float* pixels[kWindowPixels];
     find_pixels(row, pixels);
-    fit_windows(pixels, model.weight, model.scale, model.azimuth, model.altitude, pixels[centre_of(row)], windows_,
-                planes.inverse_range.data(), planes.slope_azimuth.data(), planes.slope_altitude.data(),
-                planes.deviation_m.data());
+    fit_windows(pixels, model.weight, model.scale, model.azimuth, model.altitude, pixels[centre_of(row)],
+                window_pixels_, windows_, planes.inverse_range.data(), planes.slope_azimuth.data(),
+                planes.slope_altitude.data(), planes.deviation_m.data());
     const auto& usable = usable_[static_cast<std::size_t>(row)];
     for (std::size_t i = 0; i < count; ++i) {
         if (!usable[i]) planes.inverse_range[i] = 0.0F;
@@ -249,7 +260,7 @@ void PlaneWindows::fit_partial(int row, int window, const float* const* pixels, 
     float weight[kWindowPixels];  // 1 of what came, else 0
     unsigned came = 0;            // bit by pixel
     bool returned = true;
-    for (int k = 0; k < kWindowPixels; ++k) {
+    for (int k = 0; k < window_pixels_; ++k) {
         const float value = pixels[k][at];
         returned &= value != 0.0F;
         weight[k] = value > 0.0F ? 1.0F : 0.0F;
@@ -259,17 +270,17 @@ void PlaneWindows::fit_partial(int row, int window, const float* const* pixels, 
     constexpr unsigned kLine = (1U << kWindowSide) - 1;
     int rows = 0;
     unsigned columns = 0;
-    for (int r = 0; r < kWindowSide; ++r) {
+    for (int r = 0; r < window_rows_; ++r) {
         const unsigned line = (came >> (r * kWindowSide)) & kLine;
         rows += line != 0 ? 1 : 0;
         columns |= line;
     }
     const int count = std::popcount(came);
-    if (!returned || count == kWindowPixels || rows < kLeastLines || std::popcount(columns) < kLeastLines) return;
+    if (!returned || count == window_pixels_ || rows < kLeastLines || std::popcount(columns) < kLeastLines) return;
     // Sums over the pixels of x (x, inverse depth) and of x (when, from where), with x = (1, along row, up).
     Eigen::Matrix<float, 4, 3> sums = Eigen::Matrix<float, 4, 3>::Zero();
     Eigen::Matrix<float, 4, 3> fired = Eigen::Matrix<float, 4, 3>::Zero();
-    for (int k = 0; k < kWindowPixels; ++k) {
+    for (int k = 0; k < window_pixels_; ++k) {
         const float u = model.azimuth[k];
         const float v = model.altitude[k];
         const Eigen::RowVector3f x(weight[k], weight[k] * u, weight[k] * v);
@@ -283,7 +294,7 @@ void PlaneWindows::fit_partial(int row, int window, const float* const* pixels, 
     const Eigen::Vector3f plane = (covariance * sums.row(3).transpose().cast<double>()).cast<float>();
     if (plane[0] <= kLeastInverse) return;
     float squares = 0.0F;
-    for (int k = 0; k < kWindowPixels; ++k) {
+    for (int k = 0; k < window_pixels_; ++k) {
         const float e = inverse_depth[k] - (plane[0] + model.azimuth[k] * plane[1] + model.altitude[k] * plane[2]);
         squares += weight[k] * e * e;
     }
@@ -291,7 +302,7 @@ void PlaneWindows::fit_partial(int row, int window, const float* const* pixels, 
     planes.slope_azimuth[at] = plane[1];
     planes.slope_altitude[at] = plane[2];
     // As large as that of all pixels would be: three parameters have been fitted to fewer.
-    const float share = static_cast<float>(kWindowPixels - 3) / static_cast<float>(kWindowPixels * (count - 3));
+    const float share = static_cast<float>(window_pixels_ - 3) / static_cast<float>(window_pixels_ * (count - 3));
     planes.deviation_m[at] = std::sqrt(squares * share) / (plane[0] * plane[0]);
     planes.partial.push_back({window, firing_of(covariance * fired.transpose().cast<double>())});
 }

@@ -16,9 +16,10 @@
 
 namespace dlod {
 
-/// Half width and half height of a window [pixels].
+/// Half width and, at most, half height of a window [pixels].
 inline constexpr int kWindowRadius = 2;
 inline constexpr int kWindowSide = 2 * kWindowRadius + 1;
+/// Of a window as high as it is wide.
 inline constexpr int kWindowPixels = kWindowSide * kWindowSide;
 
 /// A beam's direction and its two tangents, sensor frame.
@@ -43,7 +44,7 @@ struct PlaneRow {
     AlignedVector<float> inverse_range;   ///< [W / column_step] smoothed, 1/m, from the beam's origin
     AlignedVector<float> slope_azimuth;   ///< derivative of the inverse range along the row, towards growing columns
     AlignedVector<float> slope_altitude;  ///< the same upwards
-    AlignedVector<float> deviation_m;     ///< root mean square deviation of the ranges from the plane, of 25 pixels
+    AlignedVector<float> deviation_m;     ///< root mean square deviation of the ranges from the plane, of all pixels
     struct Partial {
         int window;
         WindowFiring firing;
@@ -61,6 +62,8 @@ class PlaneWindows {
     void fit_row(int row, PlaneRow& planes) const;
     /// Number of windows in a row; the centre of window k is column k * column_step.
     int windows() const { return windows_; }
+    /// Rows of a window: five, or three where the beams are so far apart that five would rarely meet one surface.
+    int window_rows() const { return window_rows_; }
     /// Distance from the beam's origin, metres.
     float distance(std::uint32_t range_mm) const {
         return static_cast<float>(range_mm) * 1e-3F - sensor_.beam_origin_m;
@@ -119,6 +122,8 @@ class PlaneWindows {
     std::vector<RowModel> model_;  ///< by row
     int column_step_;
     int windows_;
+    int window_rows_;
+    int window_pixels_;
     /// Inverse ranges, wrapped around the image's edge; 0 without return, kMissing of a missing column. A row holds
     /// column_step parts of stride_ values: part p is columns p, p + column_step, ..., after one that lies before the
     /// image, so that windows of a row are read without gaps.

@@ -247,7 +247,7 @@ TEST(PlaneWindows, AWindowWithAHoleIsNone) {
     for (int row = 0; row < sensor.height; ++row) {
         windows.fit_row(row, planes);
         for (int c = 50; c < 150; ++c) {
-            const bool has_hole = std::abs(row - 8) <= kWindowRadius && std::abs(c - 100) <= kWindowRadius;
+            const bool has_hole = std::abs(row - 8) <= windows.window_rows() / 2 && std::abs(c - 100) <= kWindowRadius;
             EXPECT_EQ(planes.inverse_range[static_cast<std::size_t>(c)] <= 0.0F, has_hole) << row << ' ' << c;
         }
     }
@@ -388,10 +388,10 @@ TEST(PlaneWindows, NoneLiesAcrossTheSeamBetweenTheLastColumnFiredAndTheFirst) {
     PlaneRow planes;
     for (int row = 0; row < sensor.height; ++row) {
         windows.fit_row(row, planes);
-        const int first = std::clamp(row - kWindowRadius, 0, sensor.height - kWindowSide);
+        const int first = std::clamp(row - windows.window_rows() / 2, 0, sensor.height - windows.window_rows());
         for (int c = 0; c < sensor.width; ++c) {
             int low = sensor.width, high = 0;
-            for (int r = first; r < first + kWindowSide; ++r) {
+            for (int r = first; r < first + windows.window_rows(); ++r) {
                 for (int d = -kWindowRadius; d <= kWindowRadius; ++d) {
                     const int m = sensor.measurement_of(r, (c + d + sensor.width) % sensor.width);
                     low = std::min(low, m);
@@ -404,8 +404,36 @@ TEST(PlaneWindows, NoneLiesAcrossTheSeamBetweenTheLastColumnFiredAndTheFirst) {
     }
 }
 
+// Five rows, three degrees apart, meet a wall of 2.6 m at 10 m: with such windows next to nothing but the ground was
+// flat.
+TEST(PlaneWindows, OfFewRowsAWallThatThreeRowsMeetIsAPlane) {
+    for (const int height : {32, 64}) {
+        const SensorModel sensor = staggered_sensor(height, 512);
+        Frame frame(sensor);
+        shoot_at_plane(sensor, Eigen::Vector3d::UnitX(), 5.0, 0.0, frame);
+        const int low = height / 2, high = low + 2;
+        for (int r = 0; r < height; ++r) {
+            for (int c = 0; (r < low || r > high) && c < sensor.width; ++c) frame.raw.range_mm(r, c) *= 2;
+        }
+        PlaneWindows windows(sensor, 1);
+        windows.load(frame);
+        PlaneRow planes;
+        windows.fit_row(low + 1, planes);
+        int flat = 0;
+        for (std::size_t c = 0; c < 512; ++c) {
+            flat += planes.inverse_range[c] > 0.0F && planes.deviation_m[c] < 0.03F ? 1 : 0;
+        }
+        EXPECT_EQ(windows.window_rows(), height == 32 ? 3 : 5);
+        if (height == 32) {
+            EXPECT_GT(flat, 100);
+        } else {
+            EXPECT_EQ(flat, 0);
+        }
+    }
+}
+
 TEST(PlaneWindows, ImagesWithFewerRowsThanAWindowHaveNone) {
-    const SensorModel sensor = staggered_sensor(4, 512);
+    const SensorModel sensor = staggered_sensor(2, 512);
     Frame frame(sensor);
     receive_all_columns(frame);
     frame.raw.range_mm.fill(5000);
