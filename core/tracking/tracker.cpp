@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kSimilar = 1.5;        // ratio of footprint diagonals
 constexpr double kFree = 0.5;           // evidence of a part that stands where it was free
-constexpr int kKnownHits = 8;           // from which on the extent of an object says what is a part of it
+constexpr int kKnownHits = 4;           // from which on its velocity says what is a part of an object
 constexpr double kSameFootprint = 0.4;  // parts above one another share that much of the smaller footprint
 constexpr double kMaxGap_m = 0.5;       // and are at most that far apart in height
 constexpr double kDuplicate = 0.6;      // an unseen track that shares that much with a seen one is the same object
