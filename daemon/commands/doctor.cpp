@@ -86,7 +86,7 @@ ExitCode doctor(const ConfigSources& sources) {
     report.add(check_clock_synchronised());
     if (config.lcm.url != "none") report.add(check_multicast(url_or_default(config.lcm.url)));
     check_folders(config, service, report);
-    report.add(check_sensor(config.sensor.host, config.sensor.metadata));
+    report.add(check_sensor(config.sensor.host, config.sensor.metadata, service));
     report.add(check_packets(config.sensor, kPacketTime));
     return report.failed() ? ExitCode::kFailure : ExitCode::kSuccess;
 }

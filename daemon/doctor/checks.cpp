@@ -187,11 +187,16 @@ Check check_disk(const std::filesystem::path& directory, std::uint64_t wanted_by
     return check;
 }
 
-Check check_sensor(const std::string& host, const std::string& metadata) {
+Check check_sensor(const std::string& host, const std::string& metadata,
+                   const std::optional<InstalledService>& service) {
     Check check{"sensor", Verdict::kGood, "", ""};
     if (host.empty() && metadata.empty()) {
         return {"sensor", Verdict::kFailure, "none is named: neither sensor.host nor sensor.metadata are configured",
                 "sensor.host: the sensor's name or address, in the configuration; doctor reads the file after -c"};
+    }
+    if (!metadata.empty() && service && !service->may_see(metadata)) {
+        return {check.name, Verdict::kFailure, service->unit + " does not see " + metadata,
+                "sudo install -m 644 " + metadata + " -t /etc/dlod, and name that in sensor.metadata"};
     }
     if (host.empty()) {
         check.finding = "not asked: metadata come from " + metadata;

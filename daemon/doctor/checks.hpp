@@ -45,7 +45,9 @@ Check check_clock_synchronised();
 Check check_disk(const std::filesystem::path& directory, std::uint64_t wanted_bytes,
                  const std::optional<InstalledService>& service = std::nullopt);
 
-/// Does the sensor answer over HTTP? An empty host is good: metadata come from a file then.
-Check check_sensor(const std::string& host, const std::string& metadata);
+/// Does the sensor answer over HTTP? An empty host is good: metadata come from a file then, which the service, if any,
+/// must be able to see.
+Check check_sensor(const std::string& host, const std::string& metadata,
+                   const std::optional<InstalledService>& service = std::nullopt);
 
 }  // namespace dlod::daemon

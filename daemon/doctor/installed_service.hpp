@@ -14,6 +14,8 @@ struct InstalledService {
     /// What a folder or file of the configuration means to the service.
     std::filesystem::path resolve(const std::filesystem::path& path) const { return state_directory / path; }
     bool may_write(const std::filesystem::path& folder) const;
+    /// False for what its unit hides from it: home directories.
+    bool may_see(const std::filesystem::path& file) const;
 };
 
 /// By the place of the file, as in the units: etc/dlod/dlod.yaml is dlod's, etc/dlod/NAME.yaml that of dlod@NAME.

@@ -47,5 +47,19 @@ TEST(InstalledService, ItsFolderIsMadeBySystemdAndOthersMustBeLetInto) {
     EXPECT_NE(outside.remedy.find("ReadWritePaths=" + folder.path().string()), std::string::npos) << outside.remedy;
 }
 
+TEST(InstalledService, DoesNotSeeHomeDirectories) {
+    const auto service = service_of("/etc/dlod/dlod.yaml");
+    ASSERT_TRUE(service);
+    for (const char* hidden : {"/home/me/os.json", "/root/os.json", "/etc/../home/me/os.json"}) {
+        const Check check = check_sensor("", hidden, service);
+        EXPECT_EQ(check.verdict, Check::Verdict::kFailure) << hidden;
+        EXPECT_NE(check.remedy.find("/etc/dlod"), std::string::npos) << check.remedy;
+        EXPECT_EQ(check_sensor("", hidden).verdict, Check::Verdict::kGood) << "by hand it is seen";
+    }
+    for (const char* seen : {"/etc/dlod/os.json", "/var/lib/dlod/os.json", "/homes/os.json"}) {
+        EXPECT_EQ(check_sensor("", seen, service).verdict, Check::Verdict::kGood) << seen;
+    }
+}
+
 }  // namespace
 }  // namespace dlod::daemon
