@@ -10,6 +10,8 @@ namespace {
 constexpr int kPasses = 4;
 // A robot that stands, or nearly, sees so much of its first scan again.
 constexpr double kSameViewShare = 0.85;
+// Without IMU, one that seems to have moved farther meanwhile may have moved any other way as well.
+constexpr double kNearlyStanding_m = 0.05;
 // For the same: surfaces by the direction that they face in the plan, and points of one that make it count.
 constexpr std::size_t kViewDirections = 4;
 constexpr double kMinViewPoints = 100.0;
@@ -37,7 +39,8 @@ void Bootstrap::align(FrameRegistration& registration, MotionFilter& filter, Key
     const Second second{registration, filter, map};
     const MotionFilter unmoved = first_filter_;
     registration.align(filter, map.submap(), {});
-    first_filter_ = sees_the_same(registration) ? unmoved : likeliest_start(second);
+    const bool nearly_stands = filter.uses_imu() || filter.correction().head<3>().norm() < kNearlyStanding_m;
+    first_filter_ = nearly_stands && sees_the_same(registration) ? unmoved : likeliest_start(second);
     begin_again(second);
     settle(second, kPasses, FrameRegistration::kManyIterations);
     registration.align(filter, map.submap(), {});

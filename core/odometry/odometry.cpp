@@ -18,10 +18,14 @@ constexpr double kAway_m = 15.0;
 constexpr double kAway_rad = 1.0;
 // Gates open as the prediction's standard deviation grows beyond this.
 constexpr double kSureDeviation_m = 0.1;
+// A pose that was in doubt is not any more with a smaller one: velocities are known to half a metre a second.
+constexpr double kShownDeviation_m = 0.05;
 constexpr double kMaxWidening = 3.0;
 // Of what could speak for the motion over the ground, this share has to.
 constexpr double kLeastShare = 0.1;
 constexpr double kLeastShareAtStart = 0.2;
+// From one scan to the next a robot changes its velocity by less than this over a tenth of a second.
+constexpr double kPlausibleCorrection_m = 0.1;
 // Without IMU the motion of a robot that stands is known no better than this.
 constexpr double kSlow_mps = 0.15;
 constexpr double kSlow_radps = 0.1;
@@ -65,6 +69,7 @@ void Odometry::process(Frame& frame, const OdometryFeedback* feedback) {
         write_nothing(frame);
         return;
     }
+    now_.trusted = now_.trusted && (sure_ || now_.begins_map);
     level(frame);
     registration_.scan().move(filter_);
     write_result(frame);
@@ -112,7 +117,7 @@ void Odometry::follow(const Frame& frame) {
         now_.registered = now_.registered || find_again(frame);
     }
     if (now_.registered) {
-        now_.trusted = !contradicts_map();
+        judge();
         bootstrap_.end();
         return;
     }
@@ -154,10 +159,12 @@ bool Odometry::register_frame(const Frame& frame) {
     return false;
 }
 
-/// Without IMU nothing supports the motion of a start but that the two scans fit.
+/// Without IMU nothing supports the motion of a start but that the two scans fit, and that the way from one to the
+/// other is that of the motion which both have been deskewed for.
 bool Odometry::starts_badly() const {
-    return bootstrap_.pending() && !filter_.uses_imu() &&
-           FrameRegistration::contradicts(now_.quality, kLeastShareAtStart);
+    if (!bootstrap_.pending() || filter_.uses_imu()) return false;
+    return FrameRegistration::contradicts(now_.quality, kLeastShareAtStart) ||
+           filter_.correction().head<3>().norm() > kPlausibleCorrection_m;
 }
 
 /// Without IMU a sudden turn or shock can take the scan farther from its prediction than a registration finds back.
@@ -165,6 +172,18 @@ bool Odometry::starts_badly() const {
 bool Odometry::contradicts_map() const {
     return registration_.is_degenerate() && !filter_.uses_imu() &&
            FrameRegistration::contradicts(now_.quality, kLeastShare);
+}
+
+/// Without IMU a pose that is in doubt stays so, and nothing becomes part of the map, until a scan shows where the
+/// robot is, in all directions and better than its prediction: that nothing speaks against it is not enough. So does
+/// the first one, until the next scan shows that it is worth beginning with; else the world begins with a later one.
+void Odometry::judge() {
+    now_.trusted = !contradicts_map();
+    const bool shown = now_.trusted && !registration_.is_degenerate() &&
+                       filter_.position_deviation_m() < kShownDeviation_m &&
+                       filter_.correction().head<3>().norm() < kPlausibleCorrection_m;
+    sure_ = filter_.uses_imu() || shown || (sure_ && now_.trusted);
+    now_.fits = filter_.uses_imu() || !usual_.lacks_fit(now_.quality);
 }
 
 /// Without IMU, whose motion could not tell a robot that stands from one that is slow.
@@ -254,6 +273,7 @@ void Odometry::begin_map(const Frame& frame, const Eigen::Isometry3d& T_world_se
     started_ = true;
     now_.registered = true;
     now_.begins_map = true;
+    sure_ = filter_.uses_imu();
     map_sequence_ = frame.header.sequence;
     levelling_.begin_map();
     uncertainty_.begin_map(T_world_sensor.translation(), covariance);

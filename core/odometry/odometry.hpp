@@ -38,6 +38,7 @@ class Odometry {
     struct Course {
         bool registered = false;
         bool trusted = true;                       ///< false: what this frame gives is not to be used
+        bool fits = true;                          ///< as well as scans do usually
         bool begins_map = false;                   ///< the map begins with it
         std::optional<std::int64_t> void_scan_ns;  ///< as in the result
         std::uint32_t flags = 0;
@@ -53,6 +54,7 @@ class Odometry {
     bool register_frame(const Frame& frame);
     bool starts_badly() const;
     bool contradicts_map() const;
+    void judge();
     bool stands(const Frame& frame);
     void accept();
     void see_uncertainty();
@@ -65,7 +67,7 @@ class Odometry {
     void write_result(Frame& frame);
     void write_keyframe_points(Frame& frame) const;
     void write_nothing(Frame& frame) const;
-    bool is_valid(const Matrix6d& deviation) const;
+    bool is_usable(const Matrix6d& deviation) const;
 
     SensorModel sensor_;
     OdometryConfig config_;
@@ -84,6 +86,7 @@ class Odometry {
     Spaciousness spaciousness_;
 
     bool started_ = false;
+    bool sure_ = false;                 ///< scans have shown where the robot is since that was last in doubt
     std::uint64_t world_sequence_ = 0;  ///< of the frame that the world began with
     std::uint64_t map_sequence_ = 0;    ///< of the frame that the map began with
     Course now_;

@@ -24,7 +24,10 @@ void Odometry::write_result(Frame& frame) {
     out.flags = now_.flags | (filter_.uses_imu() ? OdometryResult::kImuUsed : 0U) |
                 (now_.registered ? 0U : OdometryResult::kPredictedOnly);
     const Matrix6d deviation = filter_.pose_covariance();
-    out.valid = is_valid(deviation);
+    const bool usable = is_usable(deviation);
+    const bool shown = sure_ && now_.fits;
+    out.valid = usable && shown;
+    out.in_doubt = usable && !shown;
 
     PlacedScan& scan = registration_.scan();
     deskew(sensor_, scan.motion(), frame);
@@ -47,7 +50,7 @@ void Odometry::write_result(Frame& frame) {
 }
 
 /// @param deviation covariance of the pose against the local map
-bool Odometry::is_valid(const Matrix6d& deviation) const {
+bool Odometry::is_usable(const Matrix6d& deviation) const {
     const bool is_followed = now_.registered || registered_motion_.since_s(filter_.stamp_ns()) < kMaxPrediction_s;
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> position(deviation.topLeftCorner<3, 3>(),
                                                                   Eigen::EigenvaluesOnly);
@@ -84,6 +87,7 @@ void Odometry::write_nothing(Frame& frame) const {
     out.covariance.setZero();
     out.imu = filter_.imu_correction();
     out.valid = false;
+    out.in_doubt = false;
     out.keyframe = false;
     out.void_scan_ns.reset();
     out.flags = OdometryResult::kPredictedOnly;

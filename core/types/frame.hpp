@@ -110,10 +110,12 @@ struct OdometryResult {
     /// for planning around what is seen now. False: not to be used, not written, published with its flag. It says
     /// nothing of the way from the world's origin: that is what the covariance is for.
     bool valid = false;
+    /// It would be valid, had scans shown already that the local map is where the robot is (without IMU).
+    bool in_doubt = false;
     std::uint32_t flags = 0;
-    /// Good enough for seeing what moves: valid, or else registered with the local map but adrift along a direction in
-    /// which nothing is to be seen.
-    bool follows_map() const { return valid || (flags & (kDegenerate | kPredictedOnly)) == kDegenerate; }
+    /// Good enough for seeing what moves: valid, or in doubt only for where the map is, or else registered with the
+    /// local map but adrift along a direction in which nothing is to be seen.
+    bool follows_map() const { return valid || in_doubt || (flags & (kDegenerate | kPredictedOnly)) == kDegenerate; }
     /// What earlier frames saw does not fit this one: a new map, or one whose first scan is void.
     bool earlier_is_void() const { return (flags & kReinitialized) != 0 || void_scan_ns.has_value(); }
     Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();  ///< at the frame's stamp

@@ -60,7 +60,7 @@ TEST_P(MotionAtStart, TheWorldIsLevelledBeforeAPoseIsValid) {
     }
 }
 
-TEST_P(MotionAtStart, WithoutImuThePosesAreValidAtOnce) {
+TEST_P(MotionAtStart, WithoutImuThePosesAreValidFromTheSecondOn) {
     DriveOptions options;
     options.imu = false;
     SimulatedDrive drive(
@@ -68,7 +68,7 @@ TEST_P(MotionAtStart, WithoutImuThePosesAreValidAtOnce) {
     OdometryRun run(drive, {});
     run.run(0, 14);
     for (std::size_t i = 0; i < run.frames.size(); ++i) {
-        EXPECT_TRUE(run.frames[i].valid) << i;
+        EXPECT_EQ(run.frames[i].valid, i > 0) << i;
         EXPECT_LT(run.position_error(i), 0.05) << i;
     }
 }

@@ -86,6 +86,55 @@ TEST_P(FirstFrame, ThatIsNearlyEmptyIsNotValid) {
 
 INSTANTIATE_TEST_SUITE_P(Odometry, FirstFrame, testing::Bool());
 
+// What its scan sees is good for seeing what moves all the same.
+TEST(WithoutImu, TheFirstPoseIsInDoubtUntilTheNextScanFits) {
+    SimulatedDrive drive(furnished_room(), drive_on);
+    OdometryConfig config;
+    config.use_imu = false;
+    OdometryRun run(drive, config);
+    run.step(0);
+    EXPECT_FALSE(run.frame().odometry.valid);
+    EXPECT_TRUE(run.frame().odometry.in_doubt);
+    EXPECT_TRUE(run.frame().odometry.follows_map());
+    run.step(1);
+    EXPECT_TRUE(run.frame().odometry.valid);
+    EXPECT_FALSE(run.frame().odometry.in_doubt);
+}
+
+// The motion of a start is known by the next scan; where that does not fit, the world begins later.
+TEST(WithoutImu, TheFirstPoseIsNotValidBeforeTheNextScanFits) {
+    SimulatedDrive drive(furnished_room(), [](double t) { return drive_on(t < 0.105 ? t + 3.0 : t); });
+    OdometryConfig config;
+    config.use_imu = false;
+    OdometryRun run(drive, config);
+    run.run(0, 20);
+    EXPECT_FALSE(run.frames[0].valid);
+    EXPECT_LE(run.first_valid(), 3U);
+    expect_good_from(run, run.first_valid());
+}
+
+// Once it is in doubt where the robot is, that nothing speaks against a pose does not make it valid again.
+TEST(WithoutImu, NoPoseIsValidAfterASuddenTurnUntilTheMapBeginsAnew) {
+    constexpr std::size_t kTurn = 15;
+    SimulatedDrive drive(furnished_room(), [](double t) {
+        Eigen::Isometry3d T = drive_on(t);
+        const double turning_s = std::clamp(t - 0.1 * kTurn, 0.0, 0.6);
+        T.linear() = T.linear() * Eigen::AngleAxisd(5.0 * turning_s, Eigen::Vector3d::UnitZ());
+        return T;
+    });
+    OdometryConfig config;
+    config.use_imu = false;
+    OdometryRun run(drive, config);
+    run.run(0, 45);
+    bool anew = false;
+    for (std::size_t i = kTurn; i < run.frames.size(); ++i) {
+        anew = anew || (run.frames[i].flags & kReinitialized) != 0;
+        EXPECT_TRUE(anew || !run.frames[i].valid || run.position_error(i) < 0.1) << i;
+    }
+    EXPECT_TRUE(run.frames[kTurn - 1].valid);
+    EXPECT_TRUE(run.frames.back().valid);
+}
+
 class Gap : public testing::TestWithParam<bool> {};
 
 TEST_P(Gap, OfThreeSecondsEndsInTheSameMap) {
