@@ -9,7 +9,7 @@ namespace {
 
 // A scan with fewer flat points is not worth beginning with.
 constexpr std::size_t kMinFirstPoints = 100;
-// After so long without a registration the map is given up.
+// After so long without a registration, or in doubt, the map is given up.
 constexpr double kLost_s = 2.0;
 // Without a scan for longer than this there is no prediction worth the name.
 constexpr double kMaxGap_s = 5.0;
@@ -119,6 +119,10 @@ void Odometry::follow(const Frame& frame) {
     if (now_.registered) {
         judge();
         bootstrap_.end();
+        if (sure_) sure_ns_ = frame.header.stamp_ns;
+        if (static_cast<double>(frame.header.stamp_ns - sure_ns_) * 1e-9 > kLost_s) {
+            begin_map_here(frame, Matrix6d::Zero());
+        }
         return;
     }
     // Two first scans that do not fit each other: one of them is no good, and which will be seen.
@@ -274,6 +278,7 @@ void Odometry::begin_map(const Frame& frame, const Eigen::Isometry3d& T_world_se
     now_.registered = true;
     now_.begins_map = true;
     sure_ = filter_.uses_imu();
+    sure_ns_ = frame.header.stamp_ns;
     map_sequence_ = frame.header.sequence;
     levelling_.begin_map();
     uncertainty_.begin_map(T_world_sensor.translation(), covariance);

@@ -87,6 +87,7 @@ class Odometry {
 
     bool started_ = false;
     bool sure_ = false;                 ///< scans have shown where the robot is since that was last in doubt
+    std::int64_t sure_ns_ = 0;          ///< stamp of the last frame for which they had, or that the map began with
     std::uint64_t world_sequence_ = 0;  ///< of the frame that the world began with
     std::uint64_t map_sequence_ = 0;    ///< of the frame that the map began with
     Course now_;
