@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/odometry/motion_iteration.hpp"
+
 namespace dlod {
 namespace {
 
@@ -14,7 +16,7 @@ constexpr double kSameViewShare = 0.85;
 constexpr double kNearlyStanding_m = 0.05;
 // For the same: surfaces by the direction that they face in the plan, and points of one that make it count.
 constexpr std::size_t kViewDirections = 4;
-constexpr double kMinViewPoints = 100.0;
+constexpr double kMinViewPoints = 15.0;
 // What a robot may be at when it is switched on: velocities to begin with, in eight directions of the horizontal plane.
 constexpr double kFirstSpeeds_mps[] = {5.0, 10.0, 15.0};
 constexpr int kFirstDirections = 8;
@@ -50,7 +52,8 @@ void Bootstrap::align(FrameRegistration& registration, MotionFilter& filter, Key
 /// look the same from everywhere, and only the little that faces along it tells a motion.
 bool Bootstrap::sees_the_same(const FrameRegistration& registration) {
     const PlacedScan& scan = registration.scan();
-    if (registration.quality().near < kSameViewShare * static_cast<double>(scan.candidates())) return false;
+    // Raw points, as of leaves, find no surface in a map of one scan.
+    double flat = 0.0;
     std::array<double, kViewDirections> seen{};
     std::array<double, kViewDirections> again{};
     const auto count = [](std::array<double, kViewDirections>& counts, float nx, float ny) {
@@ -60,13 +63,18 @@ bool Bootstrap::sees_the_same(const FrameRegistration& registration) {
         ++counts[static_cast<std::size_t>(half_turns * kViewDirections + 0.5) % kViewDirections];
     };
     for (std::size_t i = 0; i < scan.left_out().size(); ++i) {
-        if (scan.points().planarity[i] > 0.0F && !scan.left_out()[i])
-            count(seen, scan.placed().nx[i], scan.placed().ny[i]);
+        if (scan.points().planarity[i] <= 0.0F || scan.left_out()[i] || !scan.points().is_flat(i)) continue;
+        flat += 1.0;
+        count(seen, scan.placed().nx[i], scan.placed().ny[i]);
     }
     const PlaneMatches& matches = registration.matches();
-    for (std::size_t i = 0; i < matches.count; ++i) {
-        if (registration.lies_on_plane(i)) count(again, matches.h[0][i], matches.h[1][i]);
+    double flat_again = 0.0;
+    for (std::size_t i = 0; i < matches.flat; ++i) {
+        if (!registration.lies_on_plane(i)) continue;
+        flat_again += 1.0;
+        count(again, matches.h[0][i], matches.h[1][i]);
     }
+    if (flat_again < kSameViewShare * flat) return false;
     for (std::size_t k = 0; k < kViewDirections; ++k) {
         if (seen[k] >= kMinViewPoints && again[k] < kSameViewShare * seen[k]) return false;
     }
@@ -75,11 +83,12 @@ bool Bootstrap::sees_the_same(const FrameRegistration& registration) {
 
 /// The robot may be fast already: beyond a metre or so between two scans, the registration finds the nearest of what
 /// looks alike. Of the ways that it finds from several velocities the one counts that explains most of the scan; a
-/// faster one has to explain clearly more.
+/// faster one has to explain clearly more, and all of them more than what has just been found without any.
 MotionFilter Bootstrap::likeliest_start(const Second& second) {
     const MotionFilter unmoved = first_filter_;
     MotionFilter best = unmoved;
-    double best_fit = 0.0;
+    second.registration.match(second.map.submap());
+    double best_fit = second.registration.quality().fit;
     const auto try_velocity = [&](const Eigen::Vector3d& velocity_mps) {
         first_filter_ = unmoved;
         first_filter_.forget_velocity();
@@ -104,17 +113,23 @@ MotionFilter Bootstrap::likeliest_start(const Second& second) {
     return best;
 }
 
-/// Registers the scan and deskews the first one for the motion that this gives, so many times.
+/// Registers the scan and deskews the first one for the motion that this gives, so many times. Where what is to be seen
+/// of the motion lies in a part of the sweep, the motion that it gives goes too far.
 void Bootstrap::settle(const Second& second, int passes, int iterations_a_pass) {
     const double dt = static_cast<double>(second.registration.scan().stamp_ns() - first_filter_.stamp_ns()) * 1e-9;
+    MotionIteration iteration;
     for (int pass = 0; pass < passes; ++pass) {
         second.registration.align(second.filter, second.map.submap(), {.first_stage_iterations = iterations_a_pass});
         if (!second.registration.has_matches()) return;
         const MotionFilter::Vector correction = second.filter.correction();
         const MotionState& first = first_filter_.state();
-        Eigen::Vector3d rate = first.rate_radps;
-        if (!second.filter.uses_imu()) rate += first.rotation.conjugate() * correction.segment<3>(3) / dt;
-        first_filter_.set_motion(first.velocity_mps + correction.segment<3>(0) / dt, rate);
+        Vector6d motion, change;
+        motion << first.velocity_mps, first.rate_radps;
+        change << correction.segment<3>(0), first.rotation.conjugate() * correction.segment<3>(3);
+        change /= dt;
+        if (second.filter.uses_imu()) change.tail<3>().setZero();
+        motion = iteration.next(motion, change);
+        first_filter_.set_motion(motion.head<3>(), motion.tail<3>());
         begin_again(second);
     }
 }

@@ -21,10 +21,11 @@ struct PlaneMatches {
     AlignedVector<float> lever_m;          ///< |q - s|
     AlignedVector<std::uint32_t> surface;  ///< equal for matches with the same plane
     std::size_t count = 0;
+    std::size_t flat = 0;  ///< of them the first so many: those of points whose normal is known
 
     /// Makes room for n matches.
     void reserve(std::size_t n);
-    void clear() { count = 0; }
+    void clear() { count = flat = 0; }
     void push(const float normal[3], const float lever[3], float distance, float inverse_variance, float time,
               std::uint32_t of_surface);
 };

@@ -85,6 +85,7 @@ void ScanToScan::match(const PointSelection& points, std::span<const std::uint8_
         matches.push(n.data(), lever, residual, points.planarity[i] * fall * fall / kNoiseVariance, points.time_s[i],
                      static_cast<std::uint32_t>(cell));
     }
+    matches.flat = matches.count;
 }
 
 }  // namespace dlod

@@ -101,6 +101,7 @@ void ScanToSubmap::match(const PointSelection& points, std::span<const std::uint
         const float weight = points.planarity[i] * fall * fall / (plane->thickness_m * plane->thickness_m);
         const float lever[3] = {placed.lx[i], placed.ly[i], placed.lz[i]};
         matches.push(plane->normal, lever, residual, weight, points.time_s[i], plane->surface);
+        if (flat) matches.flat = matches.count;
     }
 }
 
