@@ -14,9 +14,11 @@ constexpr int kPasses = 4;
 constexpr double kSameViewShare = 0.85;
 // Without IMU, one that seems to have moved farther meanwhile may have moved any other way as well.
 constexpr double kNearlyStanding_m = 0.05;
-// For the same: surfaces by the direction that they face in the plan, and points of one that make it count.
+// For the same: surfaces by the direction that they face in the plan, and points of one that make it count; more of
+// them where the IMU is at rest, as a few may lie at edges, and face elsewhere in the map.
 constexpr std::size_t kViewDirections = 4;
 constexpr double kMinViewPoints = 15.0;
+constexpr double kMinViewPointsAtRest = 100.0;
 // What a robot may be at when it is switched on: velocities to begin with, in eight directions of the horizontal plane.
 constexpr double kFirstSpeeds_mps[] = {5.0, 10.0, 15.0};
 constexpr int kFirstDirections = 8;
@@ -37,12 +39,14 @@ void Bootstrap::begin(const PlacedScan& scan, const MotionFilter& filter) {
     first_.begin(first_points_, scan.stamp_ns(), static_cast<double>(scan.motion().duration_s));
 }
 
-void Bootstrap::align(FrameRegistration& registration, MotionFilter& filter, KeyframeDatabase& map) {
+void Bootstrap::align(FrameRegistration& registration, MotionFilter& filter, KeyframeDatabase& map, bool at_rest) {
     const Second second{registration, filter, map};
     const MotionFilter unmoved = first_filter_;
     registration.align(filter, map.submap(), {});
     const bool nearly_stands = filter.uses_imu() || filter.correction().head<3>().norm() < kNearlyStanding_m;
-    first_filter_ = nearly_stands && sees_the_same(registration) ? unmoved : likeliest_start(second);
+    first_filter_ = nearly_stands && sees_the_same(registration, at_rest ? kMinViewPointsAtRest : kMinViewPoints)
+                        ? unmoved
+                        : likeliest_start(second);
     begin_again(second);
     settle(second, kPasses, FrameRegistration::kManyIterations);
     registration.align(filter, map.submap(), {});
@@ -50,7 +54,7 @@ void Bootstrap::align(FrameRegistration& registration, MotionFilter& filter, Key
 
 /// The first scan is seen again, as a whole and by its surfaces of every direction: in a street, facades and ground
 /// look the same from everywhere, and only the little that faces along it tells a motion.
-bool Bootstrap::sees_the_same(const FrameRegistration& registration) {
+bool Bootstrap::sees_the_same(const FrameRegistration& registration, double least_points) {
     const PlacedScan& scan = registration.scan();
     // Raw points, as of leaves, find no surface in a map of one scan.
     double flat = 0.0;
@@ -76,7 +80,7 @@ bool Bootstrap::sees_the_same(const FrameRegistration& registration) {
     }
     if (flat_again < kSameViewShare * flat) return false;
     for (std::size_t k = 0; k < kViewDirections; ++k) {
-        if (seen[k] >= kMinViewPoints && again[k] < kSameViewShare * seen[k]) return false;
+        if (seen[k] >= least_points && again[k] < kSameViewShare * seen[k]) return false;
     }
     return true;
 }

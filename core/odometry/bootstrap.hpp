@@ -27,7 +27,8 @@ class Bootstrap {
 
     /// Registers the present scan with the first one and deskews that for the motion that it had. The update of the
     /// filter is left unfinished.
-    void align(FrameRegistration& registration, MotionFilter& filter, KeyframeDatabase& map);
+    /// @param at_rest says the IMU
+    void align(FrameRegistration& registration, MotionFilter& filter, KeyframeDatabase& map, bool at_rest);
     /// Stamp of the first scan, if it was published deskewed for a motion that was not its own: its points are off by
     /// more than a little.
     std::optional<std::int64_t> void_scan_ns() const;
@@ -39,7 +40,7 @@ class Bootstrap {
         MotionFilter& filter;
         KeyframeDatabase& map;
     };
-    static bool sees_the_same(const FrameRegistration& registration);
+    static bool sees_the_same(const FrameRegistration& registration, double least_points);
     MotionFilter likeliest_start(const Second& second);
     void settle(const Second& second, int passes, int iterations_a_pass);
     void begin_again(const Second& second);

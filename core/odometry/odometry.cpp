@@ -146,7 +146,7 @@ bool Odometry::register_frame(const Frame& frame) {
     keyframes_.update_submap(filter_.state().position_m);
     scan.leave_out(moving_);
     if (bootstrap_.pending() && !standing) {
-        bootstrap_.align(registration_, filter_, keyframes_);
+        bootstrap_.align(registration_, filter_, keyframes_, imu_.at_rest());
     } else {
         const double widening = std::clamp(filter_.position_deviation_m() / kSureDeviation_m, 1.0, kMaxWidening);
         const int iterations = widening > 1.0 ? FrameRegistration::kManyIterations : config_.scan_to_scan.iterations;
