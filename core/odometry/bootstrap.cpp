@@ -67,7 +67,7 @@ bool Bootstrap::sees_the_same(const FrameRegistration& registration, double leas
         ++counts[static_cast<std::size_t>(half_turns * kViewDirections + 0.5) % kViewDirections];
     };
     for (std::size_t i = 0; i < scan.left_out().size(); ++i) {
-        if (scan.points().planarity[i] <= 0.0F || scan.left_out()[i] || !scan.points().is_flat(i)) continue;
+        if (!scan.takes_part(i) || !scan.points().is_flat(i)) continue;
         flat += 1.0;
         count(seen, scan.placed().nx[i], scan.placed().ny[i]);
     }

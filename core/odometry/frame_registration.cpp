@@ -130,7 +130,7 @@ MatchQuality FrameRegistration::quality() const {
     }
     const PlacedPoints& placed = scan_.placed();
     for (std::size_t i = 0; i < scan_.left_out().size(); ++i) {
-        if (scan_.points().planarity[i] <= 0.0F || scan_.left_out()[i]) continue;
+        if (!scan_.takes_part(i)) continue;
         quality.seen += static_cast<double>(placed.nx[i] * placed.nx[i] + placed.ny[i] * placed.ny[i]);
     }
     return quality;
@@ -148,7 +148,6 @@ bool FrameRegistration::contradicts(const MatchQuality& quality, double least_sh
 
 bool FrameRegistration::is_beside_its_map(const Matrix6d& covariance, double max_deviation_m) const {
     const Observability::Directions held_directions = held_.observability().directions();
-    const PointSelection& points = scan_.points();
     const PlacedPoints& placed = scan_.placed();
     for (Eigen::Index k = 0; k < held_directions.cols(); ++k) {
         const Vector6d direction = held_directions.col(k);
@@ -158,7 +157,7 @@ bool FrameRegistration::is_beside_its_map(const Matrix6d& covariance, double max
         double seen = 0.0;
         for (std::size_t i = 0; i < scan_.left_out().size(); ++i) {
             const float along = placed.nx[i] * u.x() + placed.ny[i] * u.y() + placed.nz[i] * u.z();
-            seen += points.planarity[i] > 0.0F && !scan_.left_out()[i] && Observability::is_facing(along) ? 1.0 : 0.0;
+            seen += scan_.takes_part(i) && Observability::is_facing(along) ? 1.0 : 0.0;
         }
         double found = 0.0;
         for (std::size_t i = 0; i < matches_.count; ++i) {

@@ -10,7 +10,7 @@ namespace dlod {
 /// 1).
 class MotionIteration {
   public:
-    /// @param motion that was tried
+    /// @param motion that was tried: velocity, m/s, then turn rate, rad/s; one counts as much as the other
     /// @param change f(motion) - motion
     /// @return the motion to try next
     Vector6d next(const Vector6d& motion, const Vector6d& change);

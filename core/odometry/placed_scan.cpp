@@ -60,7 +60,7 @@ void PlacedScan::leave_out(const MovingPoints& moving) {
 
 std::size_t PlacedScan::candidates() const {
     std::size_t count = 0;
-    for (std::size_t i = 0; i < left_out_.size(); ++i) count += points_->planarity[i] > 0.0F && !left_out_[i] ? 1 : 0;
+    for (std::size_t i = 0; i < left_out_.size(); ++i) count += takes_part(i) ? 1 : 0;
     return count;
 }
 

@@ -46,6 +46,8 @@ class PlacedScan {
     const Eigen::Vector3d& origin_m() const { return origin_m_; }
     /// By point that takes part, 1: weighs nothing.
     std::span<const std::uint8_t> left_out() const { return left_out_; }
+    /// The point may find a counterpart: it weighs something, and no moving object claims it.
+    bool takes_part(std::size_t i) const { return points_->planarity[i] > 0.0F && left_out_[i] == 0; }
     /// Points that may find a counterpart.
     std::size_t candidates() const;
     /// Smoothed points of surfaces: what makes a scan worth beginning with.

@@ -17,6 +17,14 @@ class TrackerTest : public ::testing::Test {
         c.foot_m = {x, y, -1.2};
         return c;
     }
+    /// Something else, at a place in the sensor's frame.
+    Cylinder body(const Eigen::Vector3d& foot_m, double radius_m, double height_m) const {
+        Cylinder c;
+        c.foot_m = foot_m;
+        c.radius_m = radius_m;
+        c.height_m = height_m;
+        return c;
+    }
     /// The published track nearest to a place in the ground plane, or nullptr when none is within a metre.
     const Track* track_at(double x, double y) const {
         const Track* best = nullptr;

@@ -105,18 +105,11 @@ TEST_F(ObjectPartsTest, TheRestOfADividedObjectStaysPartOfIt) {
 // Bonnets return little: of a car that comes only bumper and windscreen are seen.
 TEST_F(ObjectPartsTest, BumperAndWindscreenAreOneTrack) {
     Tracker tracker(sensor, config);
-    const auto piece = [&](double x, double z, double height_m) {
-        Cylinder c;
-        c.foot_m = {x, 0.0, z};
-        c.radius_m = 0.8;
-        c.height_m = height_m;
-        return c;
-    };
     for (int k = 0; k < 30; ++k) {
         scene.next();
         const double x = 25.0 - 0.4 * k;
-        scene.add(piece(x, -1.0, 0.4));
-        scene.add(piece(x + 1.8, -0.4, 0.6));
+        scene.add(body({x, 0.0, -1.0}, 0.8, 0.4));
+        scene.add(body({x + 1.8, 0.0, -0.4}, 0.8, 0.6));
         tracker.process(scene.frame);
         if (k < 15) continue;
         ASSERT_EQ(scene.frame.detection.tracks.size(), 1U) << k;
@@ -137,15 +130,8 @@ TEST_F(ObjectPartsTest, WhatIsSeenThroughTheWindscreenBelongsToTheVan) {
         for (int k = 0; k < 30; ++k) {
             scene.next();
             const double x = 25.0 - 0.5 * k;
-            Cylinder front = person(x, 0.0);
-            front.radius_m = 0.9;
-            front.height_m = 2.0;
-            scene.add(front);
-            Cylinder seats = person(x + 5.0, inner.y_m);
-            seats.foot_m.z() = inner.top_m - 0.5;
-            seats.radius_m = 0.4;
-            seats.height_m = 0.5;
-            scene.add(seats);
+            scene.add(body({x, 0.0, -1.2}, 0.9, 2.0));
+            scene.add(body({x + 5.0, inner.y_m, inner.top_m - 0.5}, 0.4, 0.5));
             tracker.process(scene.frame);
         }
         EXPECT_EQ(scene.frame.detection.tracks.size(), inner.tracks) << inner.y_m << ' ' << inner.top_m;
@@ -156,12 +142,7 @@ TEST_F(ObjectPartsTest, WhatIsSeenThroughTheWindscreenBelongsToTheVan) {
 // its velocity says which are its own.
 TEST_F(ObjectPartsTest, PiecesOfAVehicleThatComesIntoViewAreOneTrack) {
     Tracker tracker(sensor, config);
-    const auto add_piece = [&](double x, double y, double height_m) {
-        Cylinder piece = person(x, y);
-        piece.radius_m = 0.5;
-        piece.height_m = height_m;
-        scene.add(piece);
-    };
+    const auto add_piece = [&](double x, double y, double height_m) { scene.add(body({x, y, -1.2}, 0.5, height_m)); };
     for (int k = 0; k < 4; ++k) {
         scene.next();
         const double x = 30.0 - 1.0 * k;
@@ -189,10 +170,7 @@ TEST_F(ObjectPartsTest, ADogBeforeItsOwnerKeepsItsTrack) {
     for (int k = 0; k < 30; ++k) {
         scene.next();
         const double x = 12.0 - 0.18 * k;
-        Cylinder dog = person(x, 0.0);
-        dog.radius_m = 0.2;
-        dog.height_m = 0.6;
-        scene.add(dog);
+        scene.add(body({x, 0.0, -1.2}, 0.2, 0.6));
         scene.add(person(x + 1.3, 0.0));
         tracker.process(scene.frame);
         ASSERT_EQ(scene.frame.detection.tracks.size(), 2U) << k;
@@ -201,13 +179,7 @@ TEST_F(ObjectPartsTest, ADogBeforeItsOwnerKeepsItsTrack) {
 
 // Of a car that crawls only the front stands where it was free.
 TEST_F(ObjectPartsTest, AFrontAsWideAsTheVehicleBelongsToIt) {
-    const auto part = [&](double x, double radius_m) {
-        Cylinder c;
-        c.foot_m = {x, 0.0, -1.2};
-        c.radius_m = radius_m;
-        c.height_m = 1.4;
-        return c;
-    };
+    const auto part = [&](double x, double radius_m) { return body({x, 0.0, -1.2}, radius_m, 1.4); };
     for (const double radius_m : {0.9, 0.25}) {  // a front, a person who stands in front
         Tracker tracker(sensor, config);
         for (int k = 0; k < 24; ++k) {
