@@ -55,7 +55,8 @@ void LiveService::run() {
         handle(
             signals_.wait(session_ ? session_->done_descriptor() : -1, std::clamp(left, milliseconds(0), kLookPeriod)));
         if (session_ && session_->done()) end_session();
-        if (Clock::now() < next_report) continue;
+        const bool at_the_end = stopping_ && !session_;
+        if (at_the_end || Clock::now() < next_report) continue;
         // After a standstill (SIGSTOP, say) what was missed is not made up for.
         next_report = std::max(next_report + kReportPeriod, Clock::now());
         report();

@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <chrono>
 #include <iterator>
 #include <string_view>
 #include <utility>
@@ -25,10 +26,13 @@ PipelineOptions pipeline_options(const Config& config) {
             }};
 }
 
+/// Live, nothing waits for who takes messages.
+constexpr std::chrono::milliseconds kNoPatience{0};
+
 std::unique_ptr<SessionMessages> make_messages(const Config& config, const driver::SensorInfo& sensor) {
     if (config.lcm.url == "none") return nullptr;
     return std::make_unique<SessionMessages>(config.lcm, sensor, config.method.odometry.motion,
-                                             config.extrinsics.T_base_sensor(),
+                                             config.extrinsics.T_base_sensor(), kNoPatience,
                                              [pipeline = config.pipeline] { set_up_thread("dlod-predict", pipeline); });
 }
 

@@ -161,6 +161,7 @@ ExitCode replay(const ReplayArguments& arguments) {
     if (messages) {
         messages->stop_listening();
         messages->report(pipeline, source);
+        if (messages->failed() > 0) spdlog::warn("{} LCM messages could not be sent", messages->failed());
     }
     pipeline.rethrow_failure();
     if (writer) {

@@ -1,11 +1,15 @@
 #include "daemon/commands/replay_messages.hpp"
 
+#include <chrono>
+
 #include "daemon/control/command_actions.hpp"
 
 namespace dlod::daemon {
 namespace {
 
 constexpr std::int64_t kReportPeriod_ns = 1'000'000'000;
+/// A replay is as fast as who takes its messages, while they are taken.
+constexpr std::chrono::seconds kPatience{2};
 
 std::int64_t monotonic_ns() {
     return StepTimer::now_ns(CLOCK_MONOTONIC);
@@ -16,7 +20,8 @@ std::int64_t monotonic_ns() {
 ReplayMessages::ReplayMessages(const Config& config, const driver::SensorInfo& sensor)
     : config_(config.lcm),
       maps_(config.saved_maps),
-      messages_(config.lcm, sensor, config.method.odometry.motion, config.extrinsics.T_base_sensor(), nullptr),
+      messages_(config.lcm, sensor, config.method.odometry.motion, config.extrinsics.T_base_sensor(), kPatience,
+                nullptr),
       board_(DLOD_VERSION, sensor.description(), monotonic_ns()) {}
 
 void ReplayMessages::add(const PipelineFrame& frame) {

@@ -31,6 +31,8 @@ class ReplayMessages {
     /// Sends status and sensor, each as often as live.
     void report_if_due(const Pipeline& pipeline, const driver::PacketSource& source);
     void report(const Pipeline& pipeline, const driver::PacketSource& source);
+    /// Messages that could not be sent so far.
+    std::uint64_t failed() const { return messages_.failed(); }
 
   private:
     LcmConfig config_;

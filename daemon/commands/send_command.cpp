@@ -2,13 +2,17 @@
 #include <cstdio>
 #include <dlod/command_t.hpp>
 #include <dlod/status_t.hpp>
+#include <future>
 #include <lcm/lcm-cpp.hpp>
+#include <thread>
+#include <utility>
 
 #include "daemon/commands/commands.hpp"
 #include "daemon/commands/load_config.hpp"
 #include "daemon/config/option.hpp"
 #include "daemon/pipeline/stage_times.hpp"
 #include "daemon/publish/lcm_bus.hpp"
+#include "daemon/publish/lcm_url.hpp"
 
 namespace dlod::daemon {
 namespace {
@@ -38,38 +42,56 @@ class AnswerWaiter {
     status_t answer_{};
 };
 
+/// Sends the command until it is answered.
+status_t exchange(const LcmConfig& config, const command_t& command, std::chrono::duration<double> timeout) {
+    lcm::LCM lcm(config.url);
+    if (!lcm.good()) throw MessageBusError("LCM cannot be opened: see dlod doctor");
+    AnswerWaiter waiter(command.id);
+    lcm.subscribe(config.channel_prefix + "STATUS", &AnswerWaiter::on_status, &waiter);
+    const auto deadline = Clock::now() + std::chrono::duration_cast<Clock::duration>(timeout);
+    auto next_send = Clock::now();
+    while (!waiter.answered() && Clock::now() < deadline) {
+        if (Clock::now() >= next_send) {
+            lcm.publish(config.channel_prefix + "COMMAND", &command);
+            next_send += kResend;
+        }
+        if (lcm.handleTimeout(100) < 0) throw MessageBusError("LCM cannot receive: see dlod doctor");
+    }
+    if (!waiter.answered()) {
+        throw MessageBusError("no answer on " + config.channel_prefix +
+                              "STATUS: does dlod run, with the same lcm.url and lcm.channel_prefix, and with "
+                              "lcm.commands on?");
+    }
+    return waiter.answer();
+}
+
+/// The same where LCM itself can be blocked: it is left to itself then.
+status_t exchange_or_give_up(const LcmConfig& config, const command_t& command, std::chrono::duration<double> timeout) {
+    std::packaged_task<status_t()> task([=] { return exchange(config, command, timeout); });
+    auto answer = task.get_future();
+    std::thread(std::move(task)).detach();
+    if (answer.wait_for(timeout + kResend) != std::future_status::ready) {
+        throw MessageBusError("lcm.url '" + url_or_default(config.url) + "': its server does not answer");
+    }
+    return answer.get();
+}
+
 }  // namespace
 
 ExitCode send_command(const SendArguments& arguments) {
     const Config config = load_config(arguments.config, nullptr);
     if (config.lcm.url == "none") throw ConfigError("lcm.url: none; commands need one, that of the dlod that runs");
     require_route(config.lcm.url);
-    lcm::LCM lcm(config.lcm.url);
-    if (!lcm.good()) throw MessageBusError("LCM cannot be opened: see dlod doctor");
     command_t command{};
     command.utime = StepTimer::now_ns(CLOCK_REALTIME) / 1000;
     command.id = command.utime;
     command.command = static_cast<std::int8_t>(arguments.command);
     command.argument = arguments.argument;
-    AnswerWaiter waiter(command.id);
-    lcm.subscribe(config.lcm.channel_prefix + "STATUS", &AnswerWaiter::on_status, &waiter);
-    const auto deadline =
-        Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(arguments.timeout_s));
-    auto next_send = Clock::now();
-    while (!waiter.answered() && Clock::now() < deadline) {
-        if (Clock::now() >= next_send) {
-            lcm.publish(config.lcm.channel_prefix + "COMMAND", &command);
-            next_send += kResend;
-        }
-        if (lcm.handleTimeout(100) < 0) throw MessageBusError("LCM cannot receive: see dlod doctor");
-    }
-    if (!waiter.answered()) {
-        throw MessageBusError("no answer on " + config.lcm.channel_prefix +
-                              "STATUS: does dlod run, with the same lcm.url and lcm.channel_prefix, and with "
-                              "lcm.commands on?");
-    }
-    std::printf("%s\n", waiter.answer().command_answer.c_str());
-    return waiter.answer().command_ok != 0 ? ExitCode::kSuccess : ExitCode::kFailure;
+    const std::chrono::duration<double> timeout(arguments.timeout_s);
+    const status_t answer = can_be_blocked(config.lcm.url) ? exchange_or_give_up(config.lcm, command, timeout)
+                                                           : exchange(config.lcm, command, timeout);
+    std::printf("%s\n", answer.command_answer.c_str());
+    return answer.command_ok != 0 ? ExitCode::kSuccess : ExitCode::kFailure;
 }
 
 }  // namespace dlod::daemon

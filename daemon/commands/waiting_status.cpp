@@ -2,8 +2,11 @@
 
 #include <spdlog/spdlog.h>
 
+#include <chrono>
+
 #include "daemon/control/command_actions.hpp"
 #include "daemon/pipeline/stage_times.hpp"
+#include "daemon/publish/lcm_bus.hpp"
 
 namespace dlod::daemon {
 
@@ -14,7 +17,7 @@ WaitingStatus::WaitingStatus(const Config& config, std::int64_t start_ns)
 void WaitingStatus::open_bus() {
     if (bus_ || config_.url == "none") return;
     try {
-        bus_ = std::make_unique<LcmBus>(config_.url);
+        bus_ = open_lcm(config_.url, std::chrono::milliseconds(0));
         sender_ = std::make_unique<MessageSender>(*bus_);
         control_ = RemoteControl::listen(config_, waiting_actions(), board_, *bus_);
     } catch (const MessageBusError& error) {

@@ -6,7 +6,7 @@
 
 #include "daemon/config/config.hpp"
 #include "daemon/control/remote_control.hpp"
-#include "daemon/publish/lcm_bus.hpp"
+#include "daemon/publish/message_bus.hpp"
 #include "daemon/publish/message_sender.hpp"
 #include "daemon/status/status_board.hpp"
 
@@ -27,7 +27,7 @@ class WaitingStatus {
     void open_bus();
 
     LcmConfig config_;
-    std::unique_ptr<LcmBus> bus_;
+    std::unique_ptr<MessageBus> bus_;
     std::unique_ptr<MessageSender> sender_;
     StatusBoard board_;
     std::unique_ptr<RemoteControl> control_;  // last: its thread uses all of the above

@@ -61,9 +61,10 @@ void CommandListener::State::listen() {
         if (lcm) listen_until_failure(lcm.get());
         if (is_stopped()) return;
         warnings.warn("deaf",
-                      fmt::format("commands on {} cannot be received: multicast does not work; see dlod doctor. "
-                                  "It is tried again every {} s",
-                                  channel, kRetry.count()));
+                      fmt::format("commands on {} cannot be received: {}. It is tried again every {} s", channel,
+                                  can_be_blocked(url) ? "the server of lcm.url cannot be reached, or has hung up"
+                                                      : "multicast does not work; see dlod doctor",
+                                  kRetry.count()));
     } while (wait(-1, kRetry));
 }
 

@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "daemon/publish/lcm_url.hpp"
+#include "daemon/publish/queued_bus.hpp"
 
 namespace dlod::daemon {
 
@@ -34,6 +35,18 @@ LcmBus::~LcmBus() {
 bool LcmBus::publish(const std::string& channel, std::span<const std::byte> message) {
     const std::lock_guard lock(sending_);
     return ::lcm_publish(lcm_, channel.c_str(), message.data(), static_cast<unsigned>(message.size())) == 0;
+}
+
+std::unique_ptr<MessageBus> open_lcm(const std::string& url, std::chrono::milliseconds patience) {
+    if (!can_be_blocked(url)) return std::make_unique<LcmBus>(url);
+    const auto open = [url]() -> std::unique_ptr<MessageBus> {
+        try {
+            return std::make_unique<LcmBus>(url);
+        } catch (const MessageBusError&) {
+            return nullptr;
+        }
+    };
+    return std::make_unique<QueuedBus>(open, patience);
 }
 
 }  // namespace dlod::daemon

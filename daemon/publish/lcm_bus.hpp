@@ -1,5 +1,7 @@
 #pragma once
 
+#include <chrono>
+#include <memory>
 #include <mutex>
 #include <stdexcept>
 #include <string>
@@ -36,5 +38,10 @@ class LcmBus final : public MessageBus {
     _lcm_t* lcm_ = nullptr;
     std::mutex sending_;  ///< of LCM's providers only multicast takes care that messages of several threads do not mix
 };
+
+/// LCM by any provider. One that a server can block (tcpq) is opened and written to on a thread of its own.
+/// @param patience of a QueuedBus
+/// @throws MessageBusError as LcmBus does
+std::unique_ptr<MessageBus> open_lcm(const std::string& url, std::chrono::milliseconds patience);
 
 }  // namespace dlod::daemon

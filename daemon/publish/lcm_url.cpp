@@ -12,7 +12,8 @@ namespace {
 
 constexpr const char* kDefaultUrl = "udpm://239.255.76.67:7667?ttl=0";
 constexpr std::uint16_t kDefaultPort = 7667;
-constexpr std::array<std::string_view, 5> kProviders = {"udpm://", "mpudpm://", "tcpq://", "memq://", "file://"};
+constexpr std::string_view kTcpq = "tcpq://";
+constexpr std::array<std::string_view, 5> kProviders = {"udpm://", "mpudpm://", kTcpq, "memq://", "file://"};
 
 }  // namespace
 
@@ -45,6 +46,18 @@ std::optional<driver::IpAddress> source_address_for(const LcmGroup& group) {
 bool has_route(const std::string& url) {
     const auto group = multicast_group_of(url_or_default(url));
     return !group || source_address_for(*group).has_value();
+}
+
+bool can_be_blocked(const std::string& url) {
+    return url_or_default(url).starts_with(kTcpq);
+}
+
+bool has_usable_server(const std::string& url) {
+    if (!url.starts_with(kTcpq)) return true;
+    const std::string server = url.substr(kTcpq.size(), url.find('?') - kTcpq.size());
+    if (server.empty()) return true;  // LCM's default, on this host
+    const auto endpoint = driver::parse_endpoint(server);
+    return endpoint && driver::is_ipv4(endpoint->address);
 }
 
 }  // namespace dlod::daemon

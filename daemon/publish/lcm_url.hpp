@@ -30,4 +30,12 @@ std::optional<driver::IpAddress> source_address_for(const LcmGroup& group);
 /// it at every attempt to open it.
 bool has_route(const std::string& url);
 
+/// True for the provider that sends to a server, which may be away or read nothing: tcpq. Opening it and sending then
+/// waits without end.
+bool can_be_blocked(const std::string& url);
+
+/// False where the URL is one of tcpq whose server LCM would not find: it takes an IPv4 address, with a port or
+/// without, and no name.
+bool has_usable_server(const std::string& url);
+
 }  // namespace dlod::daemon

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 
@@ -16,6 +17,8 @@ class MessageBus {
     /// Sends one encoded message. Never throws and does not wait for receivers. From any thread.
     /// @return false where it was not sent
     virtual bool publish(const std::string& channel, std::span<const std::byte> message) = 0;
+    /// Messages for which publish() gave true and that could not be sent after all; from any thread.
+    virtual std::uint64_t lost() const { return 0; }
 };
 
 }  // namespace dlod::daemon

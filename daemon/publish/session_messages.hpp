@@ -1,6 +1,7 @@
 // All that a session says over LCM.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <dlod/status_t.hpp>
 #include <functional>
@@ -19,23 +20,25 @@ namespace dlod::daemon {
 class SessionMessages {
   public:
     /// Opens LCM. Where poses are predicted, a thread begins here.
-    /// @param on_thread_start called first on it; may be empty
+    /// @param patience how long a message waits for a server that takes none (QueuedBus)
+    /// @param on_thread_start called first on the thread; may be empty
     /// @throws MessageBusError
     SessionMessages(const LcmConfig& config, const driver::SensorInfo& sensor, const MotionFilterConfig& motion,
-                    const Eigen::Isometry3d& T_base_sensor, std::function<void()> on_thread_start)
-        : bus_(config.url),
-          poses_(bus_, T_base_sensor, config),
-          predicted_poses_(bus_, sensor.model, motion, T_base_sensor, config),
-          frames_(bus_, sensor.model, T_base_sensor, config),
-          sensor_(bus_, sensor, T_base_sensor, config.channel_prefix),
-          status_(bus_),
+                    const Eigen::Isometry3d& T_base_sensor, std::chrono::milliseconds patience,
+                    std::function<void()> on_thread_start)
+        : bus_(open_lcm(config.url, patience)),
+          poses_(*bus_, T_base_sensor, config),
+          predicted_poses_(*bus_, sensor.model, motion, T_base_sensor, config),
+          frames_(*bus_, sensor.model, T_base_sensor, config),
+          sensor_(*bus_, sensor, T_base_sensor, config.channel_prefix),
+          status_(*bus_),
           status_channel_(config.channel_prefix + "STATUS") {
         if (config.predicted_pose_every == 0) return;
         prediction_ = std::make_unique<PredictedPoseThread>(
             [this](const ImuSample& sample) { predicted_poses_.publish(sample); }, std::move(on_thread_start));
     }
 
-    MessageBus& bus() { return bus_; }
+    MessageBus& bus() { return *bus_; }
 
     /// A frame's pose. @param utime [us]. On one thread.
     void publish_pose(const Frame& frame, std::int64_t utime) {
@@ -58,11 +61,11 @@ class SessionMessages {
     /// Messages that could not be sent, or not in time; from any thread.
     std::uint64_t failed() const {
         return poses_.failed() + predicted_poses_.failed() + (prediction_ ? prediction_->left_out() : 0) +
-               frames_.failed() + sensor_.failed() + status_.failed();
+               frames_.failed() + sensor_.failed() + status_.failed() + bus_->lost();
     }
 
   private:
-    LcmBus bus_;
+    std::unique_ptr<MessageBus> bus_;
     PosePublisher poses_;
     PredictedPosePublisher predicted_poses_;
     FramePublisher frames_;

@@ -32,7 +32,7 @@ constexpr Loss kLosses[] = {
     {"foreign_packets", "another sensor sends here: set sensor.sender, or give the right metadata"},
     {"implausible_packets", "damaged packets arrive"},
     {"damaged_packets", "the network damages packets, or the sensor's mode is not that of the metadata"},
-    {"lcm_failed", "LCM messages cannot be sent: check the multicast route"},
+    {"lcm_failed", "LCM messages cannot be sent: check the multicast route, or the server of tcpq"},
     {"recording_write_failed", "packets cannot be recorded: check recording.folder and its disk"},
     {"recording_buffer_full", "the disk is too slow for the recording"},
     {"output_failures", "result files are no longer written: check output.folder and its disk", true},

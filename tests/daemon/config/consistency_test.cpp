@@ -49,6 +49,7 @@ TEST(Consistency, ErrorsNameTheKey) {
              {"robot_body.boxes_m", {"robot_body.boxes_m=[0, 0, 0, 1, 1]"}},
              {"lcm.obstacles.min_height_m", {"lcm.obstacles.min_height_m=2"}},
              {"lcm.url", {"lcm.url=239.255.76.67:7667"}},
+             {"lcm.url", {"lcm.url=tcpq://planner:7700"}},
              {"lcm.channel_prefix", {prefix.c_str()}},
              {"lcm.bot_core_channel", {channel.c_str()}}}) {
         Config config;

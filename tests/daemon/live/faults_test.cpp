@@ -13,6 +13,7 @@
 #include "tests/support/fake_sensor.hpp"
 #include "tests/support/sanitizers.hpp"
 #include "tests/support/small_disk.hpp"
+#include "tests/support/tcpq_server.hpp"
 
 namespace dlod {
 namespace {
@@ -206,6 +207,23 @@ TEST_F(Faults, ANetworkOfTheMessagesThatComesLateIsAwaited) {
     EXPECT_TRUE(run.systemd.wait_for("LCM cannot be opened", 5s)) << "systemctl status says what it waits for";
     ASSERT_EQ(std::system("ip route add 224.0.0.0/4 dev lo"), 0);
     EXPECT_TRUE(run.poses_flow());
+    run.stop();
+}
+
+TEST_F(Faults, AServerOfTcpqThatStallsHoldsUpNoFrame) {
+    test::TcpqServer server(test::TcpqServer::Manners::kNeverAnswers);
+    run.start({"--lcm", server.url()});
+    EXPECT_TRUE(run.systemd.wait_for("lcm_failed: ", 30s)) << "it is told what is lost";
+    const auto frames_go_on = [&] {
+        const std::string told = run.systemd.messages();
+        const auto last = told.rfind("STATUS=");
+        return told.find("poses/s, pose", last) != std::string::npos &&
+               told.find("pipeline_dropped_frames", last) == std::string::npos;
+    };
+    EXPECT_TRUE(LiveRun::eventually(30s, frames_go_on)) << run.systemd.messages();
+    test::ChildProcess command({DLOD_BINARY, "command", "restart-odometry", "--timeout", "0.5", "--lcm", server.url()});
+    EXPECT_EQ(command.wait(20s), 6) << command.output();
+    EXPECT_NE(command.output().find("its server does not answer"), std::string::npos) << command.output();
     run.stop();
 }
 

@@ -39,5 +39,26 @@ TEST(LcmUrl, OnlyMulticastNeedsARoute) {
     EXPECT_TRUE(has_route("tcpq://127.0.0.1:7700"));
 }
 
+TEST(LcmUrl, TheServerOfTcpqIsAnAddress) {
+    for (const char* url : {"tcpq://", "tcpq://10.0.0.1", "tcpq://10.0.0.1:7700", "tcpq://10.0.0.1:7700?a=b",
+                            "udpm://239.1.2.3:7000", "memq://", ""}) {
+        EXPECT_TRUE(has_usable_server(url)) << url;
+    }
+    for (const char* url :
+         {"tcpq://planner", "tcpq://planner:7700", "tcpq://[fe80::1]:7700", "tcpq://10.0.0.1:77000"}) {
+        EXPECT_FALSE(has_usable_server(url)) << url;
+    }
+}
+
+TEST(LcmUrl, OnlyTcpqCanBeBlocked) {
+    EXPECT_TRUE(can_be_blocked("tcpq://10.0.0.1:7700"));
+    for (const char* url : {"", "udpm://239.1.2.3:7000?ttl=1", "memq://", "file://log"}) {
+        EXPECT_FALSE(can_be_blocked(url)) << url;
+    }
+    ::setenv("LCM_DEFAULT_URL", "tcpq://10.0.0.1:7700", 1);
+    EXPECT_TRUE(can_be_blocked(""));
+    ::unsetenv("LCM_DEFAULT_URL");
+}
+
 }  // namespace
 }  // namespace dlod::daemon
