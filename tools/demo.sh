@@ -4,6 +4,10 @@
 # usage: tools/demo.sh [OUTPUT_FOLDER]     (default: out/demo)
 # Can be run again at any time; without network once everything is installed.
 set -euo pipefail
+case ${1:-} in
+    --help|-h) sed -n '2,5s/^# //p' "$0"; exit 0 ;;
+    -*) sed -n '2,5s/^# //p' "$0" >&2; exit 2 ;;
+esac
 cd "$(dirname "$0")/.."
 out=${1:-out/demo}
 case $out in /*) ;; *) out=$PWD/$out ;; esac

@@ -25,5 +25,6 @@ for jar in lcm jchart2d jide-oss xmlgraphics-commons commons-io; do
         echo "lcm-spy: /usr/share/java/$jar.jar is not there: $remedy" >&2; exit 1
     fi
 done
+[[ -n ${DISPLAY:-} ]] || { echo "lcm-spy: it shows a window, and there is no DISPLAY: log in with ssh -X, or see what dlod-listen counts" >&2; exit 1; }
 # lcm-spy looks into every class of the path: the export is for those of jide-oss.
 exec java --add-exports=java.desktop/sun.swing=ALL-UNNAMED -Djava.net.preferIPv4Stack=true -Xmx128m -ea -cp "$classpath" lcm.spy.Spy ${1:+--lcm-url="$1"}

@@ -5,6 +5,7 @@
 #   --sanitizers         that, and all tests under AddressSanitizer with UndefinedBehaviorSanitizer
 # Further arguments go to ctest: tools/test.sh -R tracking
 set -euo pipefail
+case ${1:-} in --help|-h) sed -n '2,6s/^# //p' "$0"; exit 0 ;; esac
 cd "$(dirname "$0")/.."
 
 sanitizers=()

@@ -31,8 +31,8 @@ int main(int argc, char** argv) {
     dlod::tools::EvaluationOptions options;
     std::string errors_file;
     bool json = false;
-    app.add_option("TRUTH", truth_folder, "truth folder of the drive")->required()->check(CLI::ExistingDirectory);
-    app.add_option("OUT", run_folder, "output folder of the replay")->required()->check(CLI::ExistingDirectory);
+    app.add_option("TRUTH_DIR", truth_folder, "truth folder of the drive")->required()->check(CLI::ExistingDirectory);
+    app.add_option("RUN_DIR", run_folder, "output folder of the replay")->required()->check(CLI::ExistingDirectory);
     app.add_option("--range", options.range_m, "of tracks, metres; masks are scored within the range of near.bin, 25 m")
         ->capture_default_str();
     app.add_option("--far-range", options.far_range_m, "of tracks, scored once more, metres")->capture_default_str();

@@ -55,7 +55,8 @@ int main(int argc, char** argv) {
     lcm::LCM lcm(url);
     Listener listener;
     if (!lcm.good()) {
-        std::fprintf(stderr, "dlod-listen: LCM cannot be opened at %s: is there a route for multicast?\n", url.c_str());
+        std::fprintf(stderr, "dlod-listen: LCM cannot be opened%s%s: is there a route for multicast?\n",
+                     url.empty() ? "" : " at ", url.c_str());
         return 1;
     }
     lcm.subscribe(".*", &Listener::on_message, &listener);

@@ -9,6 +9,7 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <iomanip>
 #include <iostream>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -55,6 +56,7 @@ struct Options {
     FaultOptions faults;
     std::vector<std::string> gaps;
     std::vector<std::string> sectors;
+    std::string imu = "good";
     std::string imu_fault;
     std::string clock_step;
 };
@@ -111,12 +113,14 @@ std::string describe(const FaultOptions& f) {
 
 void add_options(CLI::App& app, Options& o) {
     std::vector<std::string> names;
-    std::string summaries = "the scene:";
+    std::ostringstream summaries;
+    summaries << "Scenes:\n";
     for (const SceneInfo& s : scenes()) {
         names.emplace_back(s.name);
-        summaries += "\n  " + std::string(s.name) + ": " + std::string(s.summary);
+        summaries << "  " << std::left << std::setw(27) << s.name << " " << s.summary << "\n";
     }
-    app.add_option("scene", o.scene, summaries)->required()->check(CLI::IsMember(names));
+    app.footer(summaries.str());
+    app.add_option("scene", o.scene, "see below")->required()->check(CLI::IsMember(names));
     app.add_option("--out", o.out, "folder for NAME.pcap, NAME.json and NAME_truth/");
     app.add_option("--name", o.name, "name of the drive; default: the scene");
     app.add_option("--seed", o.world.seed, "another seed, another drive; the same seed, the same bytes")
@@ -177,11 +181,11 @@ void add_options(CLI::App& app, Options& o) {
     app.add_option("--restart", o.faults.restarts_s, "the sensor restarts at these times (s)");
     app.add_option("--missing-sector", o.sectors, "columns between two encoder angles are invalid, degrees")
         ->type_name("FROM:TO");
-    app.add_option("--imu", o.faults.imu,
-                   "good; off: none; silent: ends after 40 %; stuck: one value after 30 %; spikes; axes: wrong ones; "
-                   "scale: half as much again")
-        ->transform(CLI::CheckedTransformer(kImuFaults))
-        ->type_name("STATE");
+    app.add_option("--imu", o.imu,
+                   "off: none; silent: ends after 40 %; stuck: one value after 30 %; axes: wrong ones; scale: half as "
+                   "much again")
+        ->check(CLI::IsMember(&kImuFaults))
+        ->capture_default_str();
     app.add_option("--imu-fault", o.imu_fault, "the IMU is in this state from second FROM on, for LENGTH seconds only")
         ->type_name("FROM:LENGTH");
     app.add_option("--clock-step", o.clock_step,
@@ -225,6 +229,7 @@ void prepare(Options& o) {
     for (const std::string& sector : o.sectors) {
         o.faults.sectors_deg.push_back(parse_pair(sector, "--missing-sector"));
     }
+    o.faults.imu = kImuFaults.at(o.imu);
     if (!o.imu_fault.empty()) o.faults.imu_fault_s = parse_pair(o.imu_fault, "--imu-fault");
     if (!o.clock_step.empty()) o.faults.clock_step_s = parse_pair(o.clock_step, "--clock-step");
     std::sort(o.faults.restarts_s.begin(), o.faults.restarts_s.end());
@@ -323,6 +328,9 @@ int main(int argc, char** argv) {
     std::signal(SIGTERM, interrupt);
     try {
         return run(options);
+    } catch (const std::invalid_argument& error) {  // of the command line
+        std::cerr << "dlod-sim: " << error.what() << "\n";
+        return 2;
     } catch (const std::exception& error) {
         std::cerr << "dlod-sim: " << error.what() << "\n";
         return 1;
