@@ -73,7 +73,8 @@ double motion_log_odds(const MotionCues& cues, const DynamicStateConfig& config)
     if (config.use_residual && cues.residual_points > 0 && cues.height_m > 0.0) {
         const double ratio = cues.average_residual_m / std::max(1e-3, config.theta_res * cues.height_m);
         const double excess = std::clamp(ratio - 1.0, -1.0, 2.0);
-        sum += config.residual_weight * (excess > 0.0 ? trust * excess : excess);
+        const double against = cues.residual_would_show ? excess : 0.0;
+        sum += config.residual_weight * (excess > 0.0 ? trust * excess : against);
     }
     if (config.use_displacement) {
         const double moved = cues.displacement_log_odds;
@@ -123,6 +124,8 @@ DynamicState MotionBelief::fused(const MotionCues& seen, const DynamicStateConfi
     // What is known to move has stopped, and a door's leaf hardly moves at its hinge.
     has_turned_ = has_turned_ || seen.turned;
     cues.stands = config.use_displacement && seen.stands && !known_to_move_ && !has_turned_;
+    // Against what was mapped a moment ago a walker's residual has not come to the threshold yet.
+    cues.residual_would_show = detections_ >= config.n_min;
     double step = motion_log_odds(cues, config);
     // What comes into view where nothing was ever seen differs from the map, too: that makes it a suspect, no more.
     if (config.use_free_space && free_share(cues) < 0.0 && !cues.sustained_displacement) {

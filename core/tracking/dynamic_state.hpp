@@ -14,9 +14,10 @@ namespace dlod {
 struct MotionCues {
     double average_residual_m = 0.0;
     int residual_points = 0;
-    double height_m = 0.0;    ///< h_S of Eq. 6
-    int free_points = 0;      ///< pixels where earlier frames saw free space
-    int occupied_points = 0;  ///< pixels where they saw a surface
+    double height_m = 0.0;            ///< h_S of Eq. 6
+    bool residual_would_show = true;  ///< of what moves: false while it is too young
+    int free_points = 0;              ///< pixels where earlier frames saw free space
+    int occupied_points = 0;          ///< pixels where they saw a surface
     int unknown_points = 0;
     bool turned = false;   ///< a plane that has turned since two earlier frames
     double shift_m = 0.0;  ///< of what is seen, from where the track began, ground plane: both ends of its box

@@ -89,7 +89,8 @@ struct DynamicStateConfig {
         v.flag("use_free_space", use_free_space, "cue: share of the points that lie where free space was seen");
         v.flag("use_displacement", use_displacement, "cue: registered displacement of the track's own points");
         v.parameter("n_min", n_min, Range{1, 100}, "frames",
-                    "the paper's rule: detections before an object may be dynamic");
+                    "detections before a low residual speaks against motion; the paper's rule: before an object may be "
+                    "dynamic");
         v.parameter("n_max", n_max, Range{1, 1000}, "frames",
                     "detections after which an object that is not dynamic is static");
         v.parameter("theta_res", theta_res, Range{0.0, 10.0}, "1",

@@ -63,6 +63,21 @@ TEST(DynamicState, FreeSpaceDecidesWithinThreeFrames) {
     EXPECT_LE(frames, 3);
 }
 
+// A slow walker of whom the map is a moment old lies in it still.
+TEST(DynamicState, ALowResidualSpeaksAgainstMotionOnlyOnceThatWouldShow) {
+    DynamicStateConfig config;
+    MotionCues unknown;
+    unknown.average_residual_m = 0.05;
+    unknown.residual_points = 60;
+    unknown.height_m = 1.7;
+    unknown.unknown_points = 60;
+    MotionBelief belief;
+    for (int k = 1; k < config.n_min; ++k) belief.update(unknown, config);
+    EXPECT_DOUBLE_EQ(belief.log_odds(), 0.0);
+    belief.update(unknown, config);
+    EXPECT_LT(belief.log_odds(), -0.5 * config.residual_weight);
+}
+
 TEST(DynamicState, WhatWasThereBeforeIsStatic) {
     const DynamicStateConfig config;
     MotionBelief belief;
