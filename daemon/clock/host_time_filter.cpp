@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace dlod::daemon {
 
@@ -17,6 +18,8 @@ void HostTimeFilter::restart(std::int64_t sensor_ns, std::int64_t offset_ns) {
 }
 
 void HostTimeFilter::add(std::int64_t sensor_ns, std::int64_t receive_ns) {
+    // At least by so much the host's clock was set back, where that is more than nothing.
+    const std::int64_t set_back_ns = std::exchange(receive_ns_, receive_ns) - receive_ns;
     // What is held back is added to the host's clock as if it had never been set back.
     const std::int64_t offset_ns = receive_ns + held_back_ns_ - sensor_ns;
     if (!initialized_) {
@@ -39,10 +42,11 @@ void HostTimeFilter::add(std::int64_t sensor_ns, std::int64_t receive_ns) {
             restart(sensor_ns, offset_ns);
             return;
         }
-        const std::int64_t host_before = to_host_ns(sensor_ns);
-        const bool goes_back = last_stamp_ns_ != INT64_MIN && host_before + by_ns <= last_stamp_ns_;
+        const bool goes_back = set_back_ns > 0 && last_stamp_ns_ != INT64_MIN;
         step_ = {true, by_ns, !goes_back};
-        if (goes_back) held_back_ns_ -= by_ns;
+        stepped_ = true;
+        // A sensor that was set forward meanwhile does not take utime along.
+        if (goes_back) held_back_ns_ += std::min(-by_ns, set_back_ns + kLongestGapNs);
         restart(sensor_ns, receive_ns + held_back_ns_ - sensor_ns);
         return;
     }
@@ -60,6 +64,7 @@ void HostTimeFilter::add(std::int64_t sensor_ns, std::int64_t receive_ns) {
         const std::int64_t let_go_ns = sensor_went_back ? 0 : std::min(held_back_ns_, by_ns);
         held_back_ns_ -= let_go_ns;
         step_ = {true, by_ns, let_go_ns < by_ns};
+        stepped_ = true;
         restart(sensor_ns, above_minimum_ns_ - let_go_ns);
         return;
     }
@@ -131,11 +136,14 @@ std::int64_t HostTimeFilter::next_stamp_ns(std::int64_t sensor_ns) {
     if (last_stamp_ns_ != INT64_MIN) {
         // A correction downwards is made up for little by little: who divides by the time between two stamps gets
         // something sensible.
-        const std::int64_t since_ns = std::clamp<std::int64_t>(sensor_ns - last_sensor_ns_, 0, kStepHoldNs);
+        const std::int64_t between_ns = stepped_ ? receive_ns_ - last_receive_ns_ : sensor_ns - last_sensor_ns_;
+        const std::int64_t since_ns = std::clamp<std::int64_t>(between_ns, 0, kStepHoldNs);
         stamp = std::max(stamp, last_stamp_ns_ + std::max<std::int64_t>(since_ns / 2, 1000));  // utime: microseconds
     }
     last_stamp_ns_ = stamp;
     last_sensor_ns_ = sensor_ns;
+    last_receive_ns_ = receive_ns_;
+    stepped_ = false;
     return stamp;
 }
 
@@ -143,6 +151,9 @@ HostTimeFilter HostTimeFilter::for_another_sensor() const {
     HostTimeFilter filter;
     filter.held_back_ns_ = held_back_ns_;
     filter.last_stamp_ns_ = last_stamp_ns_;
+    filter.last_receive_ns_ = last_receive_ns_;
+    filter.receive_ns_ = receive_ns_;
+    filter.stepped_ = true;
     return filter;
 }
 

@@ -47,7 +47,8 @@ class HostTimeFilter {
     static constexpr std::size_t kIntervals = 64;               // over about a minute
     static constexpr std::int64_t kStepNs = 50'000'000;         // no network delay seen on a robot lasts this long...
     static constexpr std::int64_t kStepHoldNs = 2'000'000'000;  // ...for this long
-    static constexpr double kMaxSlope = 200e-6;                 // oscillators are within 100 ppm
+    static constexpr std::int64_t kLongestGapNs = 60'000'000'000;  // between packets, that utime follows
+    static constexpr double kMaxSlope = 200e-6;                    // oscillators are within 100 ppm
 
     struct Minimum {
         double sensor_s;  // since epoch_sensor_ns_
@@ -76,7 +77,10 @@ class HostTimeFilter {
     bool above_ = false;
     std::int64_t held_back_ns_ = 0;  // a backward step of the host's clock that is not followed
     std::int64_t last_stamp_ns_ = INT64_MIN;
-    std::int64_t last_sensor_ns_ = 0;  // of that stamp
+    std::int64_t last_sensor_ns_ = 0;   // of that stamp
+    std::int64_t last_receive_ns_ = 0;  // of the packet that was added last then
+    std::int64_t receive_ns_ = 0;       // of the packet added last
+    bool stepped_ = false;              // since that stamp a clock was set: the sensor's tells no time between
     Step step_;
 };
 

@@ -195,6 +195,54 @@ TEST(HostTimeFilter, AStepBackLaterOnIsOneHoweverSmall) {
     EXPECT_NEAR(static_cast<double>(step.by_ns) * 1e-6, -80.0, 1.0);
 }
 
+/// As with two PTP masters, one of which tells TAI and the other UTC.
+TEST(HostTimeFilter, ASensorsClockThatIsSetToAndFroLeavesUtimeAtTheHosts) {
+    for (const int frames : {3, 5, 12, 40}) {
+        Simulation sim(0.0, 5);
+        HostTimeFilter filter;
+        std::int64_t last = 0;
+        for (int f = 0; f < 500; ++f) {
+            const std::int64_t host = Simulation::kHostEpoch + f * 100 * kMs;
+            const std::int64_t sensor = sim.sensor_ns(host) + (f / frames % 2 == 0 ? 0 : 37 * kSecond);
+            filter.add(sensor, host + sim.delay_ns());
+            const std::int64_t stamp = filter.next_stamp_ns(sensor);
+            EXPECT_GT(stamp, last);
+            EXPECT_NEAR(static_cast<double>(stamp - host) * 1e-6, 0.0, 35.0) << frames << ", frame " << f;
+            last = stamp;
+        }
+    }
+}
+
+TEST(HostTimeFilter, ASensorSetForwardWhileTheHostIsSetBackDoesNotTakeUtimeAlong) {
+    const Simulation sim(0.0, 5);
+    HostTimeFilter filter;
+    std::int64_t stamp = 0;
+    for (int f = 0; f < 100; ++f) {
+        const std::int64_t host = Simulation::kHostEpoch + f * 100 * kMs;
+        const std::int64_t sensor = sim.sensor_ns(host) + (f < 50 ? 0 : 1'700'000'000 * kSecond);
+        filter.add(sensor, f < 50 ? host : host - 3600 * kSecond);
+        const std::int64_t before = stamp;
+        stamp = filter.next_stamp_ns(sensor);
+        EXPECT_GT(stamp, before);
+        EXPECT_NEAR(1e-9 * static_cast<double>(stamp - host), 0.0, 61.0) << f;
+    }
+}
+
+TEST(HostTimeFilter, AnotherSensorsStampsGoOnAtTheHostsTime) {
+    const Simulation sim(0.0, 5);
+    HostTimeFilter filter;
+    std::int64_t last = 0;
+    for (int f = 0; f < 100; ++f) {
+        if (f % 20 == 0) filter = filter.for_another_sensor();
+        const std::int64_t host = Simulation::kHostEpoch + f * 100 * kMs;
+        filter.add(sim.sensor_ns(host), host);
+        const std::int64_t stamp = filter.next_stamp_ns(sim.sensor_ns(host));
+        EXPECT_GT(stamp, last);
+        EXPECT_EQ(stamp, host) << f;
+        last = stamp;
+    }
+}
+
 TEST(HostTimeFilter, TimesAtTheEndsOfWhatASensorMaySendDoNotOverflow) {
     constexpr std::int64_t kLatest = (std::int64_t{1} << 62U) - 1;
     HostTimeFilter filter;
