@@ -20,7 +20,7 @@ struct Detector::State {
           completion(sensor, c.completion),
           row_ends(2 * static_cast<std::size_t>(sensor.height)) {
         counts.reserve(4096);
-        turned.reserve(4096);
+        divided.reserve(4096);
         whole.reserve(4096);
         completed.reserve(sensor.pixels());
     }
@@ -29,7 +29,7 @@ struct Detector::State {
     void find_plates(const Frame& frame);
     void run(const Frame& frame);
     bool is_compact(const Segment& segment) const;
-    bool is_divided(const Segment& segment, std::size_t s) const;
+    bool mixes(const Segment& segment, std::size_t s) const;
     void detect(Frame& frame);
     void add(Frame& frame, std::size_t segment, std::span<const PixelIndex> pixels);
     void complete(Frame& frame);
@@ -42,7 +42,7 @@ struct Detector::State {
     TurnedPlates plates;
     Completion completion;
     std::vector<EvidenceImage::Counts> counts;  ///< by segment
-    std::vector<std::uint8_t> turned;           ///< likewise: 1 of what has a part that has turned
+    std::vector<std::uint8_t> divided;          ///< likewise: 1 of what only parts of move, or have turned
     std::vector<std::uint8_t> whole;            ///< likewise: 1 of what is no larger than a person
     std::vector<int> row_ends;
     std::vector<PixelIndex> completed;  ///< pixels of the completed detections, swapped with the frame's
@@ -63,9 +63,8 @@ bool Detector::State::is_compact(const Segment& segment) const {
 }
 
 /// Free and occupied places in one segment, or free ones in something that is no object: only parts of it move.
-bool Detector::State::is_divided(const Segment& segment, std::size_t s) const {
+bool Detector::State::mixes(const Segment& segment, std::size_t s) const {
     constexpr int kFewest = 3;
-    if (turned[s] != 0) return true;
     const EvidenceImage::Counts& c = counts[s];
     if (c.free < kFewest) return false;
     // A slow or turning object is partly where it was before: one no larger than a person stays whole unless most of it
@@ -80,7 +79,6 @@ void Detector::State::test(const Frame& frame) {
     parts.begin();
     const Preparation& prepared = frame.prepared;
     counts.assign(prepared.segments.size(), {});
-    turned.assign(prepared.segments.size(), 0);
     whole.assign(prepared.segments.size(), 0);
     for (std::size_t s = 0; s < prepared.segments.size(); ++s) whole[s] = is_compact(prepared.segments[s]) ? 1 : 0;
     for (const Segment& segment : prepared.segments) {
@@ -97,8 +95,12 @@ void Detector::State::test(const Frame& frame) {
     run(frame);
     plates.begin();
     if (config.use_plates) plates.request(frame, whole, evidence);
+    // Decided by what was tested evenly: what is tested around free places, too, says more of these than of the rest.
+    divided.assign(prepared.segments.size(), 0);
     for (std::size_t s = 0; s < prepared.segments.size(); ++s) {
-        if (is_divided(prepared.segments[s], s)) parts.request_around(frame, prepared.segments[s], evidence);
+        if (!mixes(prepared.segments[s], s)) continue;
+        divided[s] = 1;
+        parts.request_around(frame, prepared.segments[s], evidence);
     }
     run(frame);
     if (config.use_plates) find_plates(frame);
@@ -109,7 +111,7 @@ void Detector::State::find_plates(const Frame& frame) {
     plates.find(frame, evidence);
     for (std::size_t k = 0; k < plates.size(); ++k) {
         parts.take(plates[k]);
-        turned[frame.prepared.segment[plates[k].front()] - 1] = 1;
+        divided[frame.prepared.segment[plates[k].front()] - 1] = 1;
         for (const PixelIndex pixel : plates[k]) evidence.set(pixel, Evidence::kFree);
     }
 }
@@ -165,7 +167,7 @@ void Detector::State::detect(Frame& frame) {
     }
     for (std::size_t s = 0; s < prepared.segments.size(); ++s) {
         const Segment& segment = prepared.segments[s];
-        if (config.use_free_space && is_divided(segment, s)) {
+        if (config.use_free_space && divided[s] != 0) {
             const auto add_part = [&](std::span<const PixelIndex> pixels) { add(frame, s, pixels); };
             // What is left of an object may be the part of it that rests.
             parts.find(frame, segment, evidence, add_part, [&](std::span<const PixelIndex> pixels) {

@@ -28,15 +28,19 @@ struct HiddenEnds {
     bool low = false, high = false;
 };
 
-HiddenEnds hidden_ends(const Eigen::Vector2d& axis, const OrientedBox& box, const Visibility& visibility) {
+/// @param across_m size of the box across the axis
+HiddenEnds hidden_ends(const Eigen::Vector2d& axis, double across_m, const OrientedBox& box,
+                       const Visibility& visibility) {
     const Eigen::Vector2d to_box = (box.center_m - visibility.sensor_m).head<2>();
     const double distance = std::max(1e-6, to_box.norm());
     const double away = axis.dot(to_box) / distance;
     const double left = axis.dot(Eigen::Vector2d(-to_box.y(), to_box.x())) / distance;
+    // Of what the sensor stands beside only the near side is seen, at whatever angle.
+    const double oblique = std::abs(left) * distance < 0.5 * across_m ? 0.0 : kOblique;
     HiddenEnds hidden;
-    hidden.high = away > kOblique || (left > kOblique && visibility.occluded_left) ||
+    hidden.high = away > oblique || (left > kOblique && visibility.occluded_left) ||
                   (left < -kOblique && visibility.occluded_right);
-    hidden.low = away < -kOblique || (left < -kOblique && visibility.occluded_left) ||
+    hidden.low = away < -oblique || (left < -kOblique && visibility.occluded_left) ||
                  (left > kOblique && visibility.occluded_right);
     return hidden;
 }
@@ -101,15 +105,15 @@ ExtentMeasurement complete_extent(const OrientedBox& visible, const Eigen::Vecto
     const Eigen::Vector2d offset = (visible.center_m - remembered.center_m).head<2>();
     const bool piece =
         moves && remembered.longest_m() < kLimbs_m && visible.size_m.z() < kMostOfIt * remembered.size_m.z();
-    const auto ends = [&](const Eigen::Vector2d& axis) {
-        return piece ? HiddenEnds{true, true} : hidden_ends(axis, visible, visibility);
+    const auto ends = [&](const Eigen::Vector2d& axis, double across_m) {
+        return piece ? HiddenEnds{true, true} : hidden_ends(axis, across_m, visible, visibility);
     };
-    const CompletedSide length =
-        complete_side(along.dot(offset), visible.size_m.x(), before_m.x(), remembered.size_m.x(),
-                      longest_side(remembered.size_m.x(), remembered.size_m.y()), ends(along), piece, config);
-    const CompletedSide width =
-        complete_side(across.dot(offset), visible.size_m.y(), before_m.y(), remembered.size_m.y(),
-                      longest_side(remembered.size_m.y(), remembered.size_m.x()), ends(across), piece, config);
+    const CompletedSide length = complete_side(
+        along.dot(offset), visible.size_m.x(), before_m.x(), remembered.size_m.x(),
+        longest_side(remembered.size_m.x(), remembered.size_m.y()), ends(along, visible.size_m.y()), piece, config);
+    const CompletedSide width = complete_side(
+        across.dot(offset), visible.size_m.y(), before_m.y(), remembered.size_m.y(),
+        longest_side(remembered.size_m.y(), remembered.size_m.x()), ends(across, visible.size_m.x()), piece, config);
     ExtentMeasurement out;
     out.growth = {length.growth_high_m, length.growth_low_m, width.growth_high_m, width.growth_low_m};
     BoxMeasurement& m = out.box;
@@ -152,11 +156,11 @@ Growth assumed_growth(const OrientedBox& box, const Eigen::Vector3d& visible_m, 
     const double missing_width = std::min(0.5 * length, kCarWidth_m) - width;
     Growth growth;
     if (missing_length > 0.0) {
-        const HiddenEnds ends = hidden_ends(along, box, visibility);
+        const HiddenEnds ends = hidden_ends(along, width, box, visibility);
         if (ends.high != ends.low) (ends.high ? growth.front : growth.back) = missing_length;
     }
     if (missing_width > 0.0) {
-        const HiddenEnds ends = hidden_ends(across, box, visibility);
+        const HiddenEnds ends = hidden_ends(across, length, box, visibility);
         if (ends.high != ends.low) (ends.high ? growth.left : growth.right) = missing_width;
     }
     return growth;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kPartMargin_m = 0.15;     // a part's middle lies at most this far outside of the whole object's box
 constexpr double kLimbMargin_m = 0.4;      // and that of a small piece beside a moving object
-constexpr double kSplinterMargin_m = 0.8;  // and of a splinter at the corners of a vehicle
+constexpr double kSplinterMargin_m = 0.8;  // and of a splinter at the corners of a vehicle, or of a part that moves
 constexpr unsigned kSplinter = 10;         // that is so much smaller
 constexpr unsigned kLimb = 3;              // small: a third of the object's pixels
 constexpr double kLowLimb = 0.5;           // of the object's height
@@ -116,8 +116,9 @@ std::optional<PartFit> PartHost::fit(const Detection& part, const CandidateDetec
     const bool covered = object_->drives() && share_inside(part.box, box, 0.0) > kInsideVehicle;
     if (!rest && !covered && contradicts(part, evidence)) return std::nullopt;
     if (height_gap_m(box, part.box) > kMaxGap_m) return std::nullopt;
-    const std::optional<double> margin = margin_m(part, guest, rest);
+    std::optional<double> margin = margin_m(part, guest, rest);
     if (!margin) return std::nullopt;
+    if (rest && evidence.motion > kFree) margin = kSplinterMargin_m;
     const double distance_m = footprint_distance_m(box, part.centroid_m);
     if (distance_m >= nearer_than * *margin || share_inside(part.box, box, *margin) <= kInside) return std::nullopt;
     return PartFit{.distance = distance_m / *margin, .limb = distance_m > kPartMargin_m && !rest && !object_->drives()};

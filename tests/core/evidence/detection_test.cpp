@@ -187,6 +187,32 @@ TEST(Detector, PersonAgainstAWallIsSingledOut) {
     EXPECT_GE(own, 0.9 * person->count);
 }
 
+// One segment, most of which is the parked car: around the other one's free places far more pixels are tested.
+TEST(Detector, AParkedCarThatOneWhichDrivesTouchesIsNoPartOfIt) {
+    Replay run;
+    constexpr double kTouches_m = 2.05;
+    for (int k = 0; k < 14; ++k) {
+        const double rear_m = kTouches_m + 0.6 * (13 - k);
+        run.step(room_with([&](const auto& o, const auto& d) {
+                     const double parked = test::box_range({6.0, -2.0, 0.1}, {7.8, 2.0, 1.5}, o, d);
+                     const double driving = test::box_range({6.0, rear_m, 0.1}, {7.8, rear_m + 2.0, 1.5}, o, d);
+                     return test::nearest(parked, driving);
+                 }),
+                 at(0.0, 0.0));
+    }
+    const auto inside = [](double from_m, double to_m) {
+        return [=](const Eigen::Vector3d& p) { return p.x() < 8.0 && p.y() > from_m && p.y() < to_m && p.z() > 0.2; };
+    };
+    const Detection* parked = run.covering(inside(-2.0, 1.8));
+    const Detection* driving = run.covering(inside(2.3, 4.5));
+    ASSERT_NE(parked, nullptr);
+    ASSERT_NE(driving, nullptr);
+    EXPECT_EQ(parked->segment, driving->segment);
+    EXPECT_NE(parked, driving);
+    EXPECT_GT(driving->free_points, 10 * driving->occupied_points);
+    EXPECT_GT(parked->occupied_points, 5 * parked->free_points);
+}
+
 /// The same person and robot, turned so that the person crosses the image's seam.
 TEST(Detector, SeamMakesNoDifference) {
     const auto walk = [](double yaw_rad) {

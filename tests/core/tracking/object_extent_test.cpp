@@ -72,6 +72,16 @@ TEST(ObjectExtent, WhatIsAsLargeAsABusFromBehindIsLongerThanACarUnlessItsSideIsS
     EXPECT_EQ(assumed_growth(box(10.0, 0.0, 0.0, {4.0, 2.0, 2.4}), {0.2, 2.0, 2.4}, 8.0, {}).front, 0.0) << "a van";
 }
 
+// The sensor stands beside a bus and sees one side of it, most of it at a flat angle.
+TEST(ObjectExtent, OfABusAlongsideTheWidthIsRemembered) {
+    const OrientedBox bus = box(4.5, 2.25, 0.5, {12.0, 2.5, 3.0});
+    const OrientedBox side = box(4.5, 1.1, 0.5, {12.0, 0.2, 3.0});
+    const ExtentMeasurement m = complete_extent(side, side.size_m, bus, {}, true, {});
+    EXPECT_NEAR(m.box.box.size_m.y(), 2.5, 1e-9);
+    EXPECT_NEAR(m.box.box.center_m.y(), 2.25, 1e-9);
+    EXPECT_GT(m.box.size_sd_m.y(), 1.0);
+}
+
 TEST(ObjectExtent, WhatJoinsAnObjectIsEnclosed) {
     const OrientedBox bumper = box(10.0, 0.0, 0.0, {0.4, 1.8, 0.4});
     OrientedBox windscreen = box(12.0, 0.5, 0.5, {1.6, 0.8, 0.7});

@@ -102,6 +102,25 @@ TEST_F(ObjectPartsTest, TheRestOfADividedObjectStaysPartOfIt) {
     EXPECT_EQ(scene.frame.detection.tracks[0].state, DynamicState::kDynamic);
 }
 
+// Of a bus that accelerates the rear, which stands where the bus itself was not, is found beyond the expected box.
+TEST_F(ObjectPartsTest, APartOfTheSegmentThatMovesBelongsToTheObjectEvenIfItIsOutsideOfItsBox) {
+    Tracker tracker(sensor, config);
+    for (int k = 0; k < 12; ++k) {
+        scene.next();
+        const double x = 15.0 - 0.6 * k;
+        std::vector<PixelIndex> front;
+        for (const double at_m : {0.0, 2.0, 4.0}) {
+            const auto part = scene.place(body({x + at_m, 4.0, -1.2}, 0.9, 2.5));
+            front.insert(front.end(), part.begin(), part.end());
+        }
+        const std::uint32_t segment = scene.detect(front, k < 11).segment;
+        if (k == 11) scene.detect(scene.place(body({x + 4.8, 4.0, -1.2}, 0.1, 2.0)), true).segment = segment;
+        tracker.process(scene.frame);
+    }
+    EXPECT_EQ(scene.frame.detection.detections[1].track, scene.frame.detection.detections[0].track);
+    EXPECT_EQ(scene.frame.detection.tracks.size(), 1U);
+}
+
 // Bonnets return little: of a car that comes only bumper and windscreen are seen.
 TEST_F(ObjectPartsTest, BumperAndWindscreenAreOneTrack) {
     Tracker tracker(sensor, config);
