@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "daemon/sensor/request_limit.hpp"
 #include "driver/network_address.hpp"
 #include "driver/printable.hpp"
 
@@ -58,8 +59,7 @@ std::string without_answer(const std::string& host, httplib::Error error) {
            " (is the sensor powered and connected, and sensor.host right?)";
 }
 
-/// The body of a good answer, else a SensorError that says what the sensor said. Reads no more than an Ouster would
-/// send, for no longer than it could take.
+/// The body of a good answer, else a SensorError that says what the sensor said.
 std::string request(const std::string& host, std::chrono::milliseconds timeout, const std::string& method,
                     const std::string& path, const std::string& body = "") {
     httplib::Client client("http://" + host);
@@ -72,15 +72,17 @@ std::string request(const std::string& host, std::chrono::milliseconds timeout, 
     request.body = body;
     if (!body.empty()) request.set_header("Content-Type", "application/json");
     std::string answer;
-    const auto deadline = std::chrono::steady_clock::now() + kMostTimeouts * timeout;
     request.content_receiver = [&](const char* data, std::size_t size, std::uint64_t, std::uint64_t) {
         answer.append(data, size);
-        return answer.size() <= kMaxAnswer && std::chrono::steady_clock::now() < deadline;
+        return answer.size() <= kMaxAnswer;
     };
+    RequestLimit limit(kMaxAnswer, kMostTimeouts * timeout, [&] { client.stop(); });
+    client.set_socket_options([&](int socket) { limit.set_socket(socket); });
     const httplib::Result result = client.send(request);
 
     const std::string what = "sensor " + host + ": " + method + " " + path;
-    if (answer.size() > kMaxAnswer) throw SensorError(what + ": answer too large to be an Ouster's");
+    if (answer.size() > kMaxAnswer || limit.too_large())
+        throw SensorError(what + ": answer too large to be an Ouster's");
     if (!result) throw SensorError(what + ": " + without_answer(host, result.error()));
     if (result->status != 200) {
         // A page for people says no more than its title.

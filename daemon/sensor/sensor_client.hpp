@@ -39,7 +39,8 @@ std::string describe_difference(const SensorSettings& missing, const SensorSetti
 /// The state that metadata carry, "RUNNING" where they carry none.
 std::string status_of(const std::string& metadata);
 
-/// One request, one connection: the sensor may be unplugged between any two. Blocks for at most the timeout a request.
+/// One request, one connection: the sensor may be unplugged between any two. Whatever answers, a request takes no more
+/// than a few timeouts and megabytes.
 class SensorClient {
   public:
     /// @param host name or address, with `:port` where it is not 80; IPv6 addresses in brackets

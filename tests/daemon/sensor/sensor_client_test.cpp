@@ -1,7 +1,11 @@
 #include "daemon/sensor/sensor_client.hpp"
 
+#include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <httplib.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <filesystem>
@@ -121,6 +125,64 @@ TEST(SensorClient, AnAnswerWithoutEndIsCutOff) {
     const auto begin = std::chrono::steady_clock::now();
     EXPECT_NE(error_of(SensorClient(sensor.host(), milliseconds(200))), "");
     EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(10));
+}
+
+/// Answers any request with `begin`, then `again` without end, each after a pause.
+class EndlessServer {
+  public:
+    EndlessServer(const std::string& begin, const std::string& again, milliseconds pause) {
+        listening_ = ::socket(AF_INET, SOCK_STREAM, 0);
+        sockaddr_in address{};
+        address.sin_family = AF_INET;
+        address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+        socklen_t length = sizeof address;
+        EXPECT_EQ(::bind(listening_, reinterpret_cast<sockaddr*>(&address), length), 0);
+        EXPECT_EQ(::listen(listening_, 1), 0);
+        ::getsockname(listening_, reinterpret_cast<sockaddr*>(&address), &length);
+        port_ = ntohs(address.sin_port);
+        thread_ = std::thread([=, this] {
+            client_ = ::accept(listening_, nullptr, nullptr);
+            bool sent = ::send(client_, begin.data(), begin.size(), MSG_NOSIGNAL) > 0;
+            while (sent) {
+                std::this_thread::sleep_for(pause);
+                sent = ::send(client_, again.data(), again.size(), MSG_NOSIGNAL) > 0;
+            }
+        });
+    }
+    ~EndlessServer() {
+        ::shutdown(client_, SHUT_RDWR);
+        thread_.join();
+        ::close(client_);
+        ::close(listening_);
+    }
+    EndlessServer(const EndlessServer&) = delete;
+    EndlessServer& operator=(const EndlessServer&) = delete;
+
+    std::string host() const { return "127.0.0.1:" + std::to_string(port_); }
+
+  private:
+    int listening_;
+    std::atomic<int> client_{-1};
+    int port_ = 0;
+    std::thread thread_;
+};
+
+/// Without a bound these requests would not end, and take all the memory there is.
+TEST(SensorClient, WhatComesBeforeAnAnswerIsCutOffToo) {
+    const std::string line(60'000, 'x');
+    std::string headers;
+    while (headers.size() < line.size()) headers += "X-Header: " + std::to_string(headers.size()) + "\r\n";
+    for (const auto& [begin, again] : std::vector<std::pair<std::string, std::string>>{
+             {"HTTP/1.1 200 OK\r\nX: ", line}, {"HTTP/1.1 200 OK\r\n", headers}, {"HTTP/1.1 ", line}}) {
+        EndlessServer server(begin, again, milliseconds(0));
+        const std::string error = error_of(SensorClient(server.host()));
+        EXPECT_NE(error.find("too large"), std::string::npos) << error;
+    }
+    for (const std::string begin : {"H", "HTTP/1.1 200 OK\r\nX: "}) {
+        EndlessServer server(begin, "x", milliseconds(20));
+        const std::string error = error_of(SensorClient(server.host(), milliseconds(100)));
+        EXPECT_NE(error.find("no answer"), std::string::npos) << error;
+    }
 }
 
 TEST(SensorClient, WhatASensorSaysIsOneLineOfTheLog) {
