@@ -179,8 +179,8 @@ class SensorWatch::Worker {
                                              describe_difference(missing, active));
         const auto now = Clock::now();
         if (now < next_settings_) return what + "; another host, or the sensor itself, sets it back: tried again soon";
-        contest_ = now - last_settings_ < 2 * kLongestContest ? std::min<Clock::duration>(2 * contest_, kLongestContest)
-                                                              : Clock::duration(timing_.contest);
+        const bool again = last_settings_ && now - *last_settings_ < 2 * kLongestContest;
+        contest_ = again ? std::min<Clock::duration>(2 * contest_, kLongestContest) : timing_.contest;
         last_settings_ = now;
         next_settings_ = now + contest_;
         spdlog::warn("{}: setting it", what);
@@ -264,7 +264,7 @@ class SensorWatch::Worker {
     std::optional<driver::SensorInfo> in_force_;
     std::string kept_;
     std::optional<std::string> refused_;  ///< what the cache held that are no metadata
-    Clock::time_point last_settings_{};
+    std::optional<Clock::time_point> last_settings_;
     Clock::time_point next_settings_{};
     Clock::duration contest_{};
 
