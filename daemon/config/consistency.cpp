@@ -84,6 +84,10 @@ void check_lcm(const LcmConfig& lcm) {
         throw ConfigError(
             fmt::format("lcm.url: '{}' is none of LCM's; write udpm://239.255.76.67:7667?ttl=1, or none", lcm.url));
     }
+    if (lcm.url.starts_with("udpm://") && !multicast_group_of(lcm.url)) {
+        throw ConfigError(fmt::format(
+            "lcm.url: '{}' has no multicast address (224.0.0.0 to 239.255.255.255) with a port up to 65535", lcm.url));
+    }
     if (!has_usable_server(lcm.url)) {
         throw ConfigError(fmt::format(
             "lcm.url: '{}': LCM finds the server by its IPv4 address only; as in tcpq://192.168.1.5:7700", lcm.url));

@@ -26,7 +26,9 @@ TEST(Consistency, WhatFitsTogetherPasses) {
                         "sensor.bind_address=192.168.1.5", "sensor.forward_to=[::1]:7000", "sensor.lidar_port=7000"}),
               "");
     EXPECT_EQ(error_of({"robot_body.boxes_m=[0, 0, 0, 1, 1, 1]"}), "");
-    for (const char* url : {"lcm.url=none", "lcm.url=udpm://", "lcm.url=tcpq://10.0.0.1:7700", "lcm.url=memq://"}) {
+    for (const char* url :
+         {"lcm.url=none", "lcm.url=udpm://", "lcm.url=udpm://?ttl=1", "lcm.url=udpm://239.1.2.3:7000?x=y&ttl=1",
+          "lcm.url=tcpq://10.0.0.1:7700", "lcm.url=memq://"}) {
         EXPECT_EQ(error_of({url}), "");
     }
 }
@@ -50,6 +52,8 @@ TEST(Consistency, ErrorsNameTheKey) {
              {"lcm.obstacles.min_height_m", {"lcm.obstacles.min_height_m=2"}},
              {"lcm.url", {"lcm.url=239.255.76.67:7667"}},
              {"lcm.url", {"lcm.url=tcpq://planner:7700"}},
+             {"lcm.url", {"lcm.url=udpm://10.0.0.1:7667"}},
+             {"lcm.url", {"lcm.url=udpm://239.255.76.67:76670?ttl=1"}},
              {"lcm.channel_prefix", {prefix.c_str()}},
              {"lcm.bot_core_channel", {channel.c_str()}}}) {
         Config config;
