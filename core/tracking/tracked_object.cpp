@@ -345,7 +345,11 @@ bool TrackedObject::under_way() const {
 }
 
 bool TrackedObject::drives() const {
-    return under_way() && filter_.box().longest_m() > kVehicle_m;
+    return under_way() && is_moving_vehicle();
+}
+
+bool TrackedObject::is_moving_vehicle() const {
+    return belief_.state() == DynamicState::kDynamic && has_moved_ && filter_.box().longest_m() > kVehicle_m;
 }
 
 bool TrackedObject::sets_off() const {

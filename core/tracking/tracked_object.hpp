@@ -61,7 +61,9 @@ class TrackedObject {
     OrientedBox box() const { return filter_.box(); }
     Eigen::Vector3d velocity() const { return filter_.velocity(); }
     double velocity_sd() const { return filter_.velocity_sd(); }
-    /// It is as large as a vehicle, and under way.
+    /// It is as large as a vehicle, has moved beyond doubt, and is dynamic: it may have stopped a moment ago.
+    bool is_moving_vehicle() const;
+    /// That, and it is under way.
     bool drives() const;
     /// It is known to be as small as people are, and as tall.
     bool is_body() const;

@@ -145,7 +145,7 @@ void Tracker::State::associate(Frame& frame) {
 // What was a part of another object all the time leaves it its past.
 void Tracker::State::give_way(std::size_t guest, TrackedObject& host, std::vector<OrientedBox>& cleared) {
     absorbed[guest] = 1;
-    if (host.drives()) host.take_past(objects[guest], cleared);
+    if (host.is_moving_vehicle()) host.take_past(objects[guest], cleared);
 }
 
 // One of two tracks on one vehicle gives its piece to the other, whose box takes it in.
@@ -203,9 +203,10 @@ void Tracker::State::attach_parts(Frame& frame) {
             owner[d] = track_of_host[h];
         }
         limb[d] = best.limb ? 1 : 0;
-        if (own >= 0 && owner[d] != own) {
-            give_way(static_cast<std::size_t>(own), *object(owner[d]), frame.detection.cleared);
-        }
+        if (owner[d] == own) continue;
+        if (own >= 0) give_way(static_cast<std::size_t>(own), *object(owner[d]), frame.detection.cleared);
+        // Nobody has watched it before, and what of it was near the ground or apart may have been taken for static.
+        if (own < 0 && object(owner[d])->is_moving_vehicle()) frame.detection.cleared.push_back(detections[d].box);
     }
 }
 

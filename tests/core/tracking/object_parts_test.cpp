@@ -121,6 +121,35 @@ TEST_F(ObjectPartsTest, APartOfTheSegmentThatMovesBelongsToTheObjectEvenIfItIsOu
     EXPECT_EQ(scene.frame.detection.tracks.size(), 1U);
 }
 
+// Of a bus that crawls behind a post the rear side lies where the bus was a moment ago, and is seen by itself.
+TEST_F(ObjectPartsTest, TheRearOfABusThatCrawlsIsPartOfIt) {
+    Tracker tracker(sensor, config);
+    double front_x = 0.0;
+    for (int k = 0; k < 40; ++k) {
+        scene.next();
+        front_x += k < 20 ? 0.4 : 0.05;
+        std::vector<PixelIndex> front, rear;
+        for (int i = 0; i < 9; ++i) {
+            Cylinder slice = body({front_x - i, 12.0, -1.2}, 0.6, 2.5);
+            slice.points = 40;
+            auto& part = i < 4 ? front : rear;
+            const auto pixels = scene.place(slice);
+            part.insert(part.end(), pixels.begin(), pixels.end());
+        }
+        const bool apart = k >= 30;
+        if (!apart) front.insert(front.end(), rear.begin(), rear.end());
+        scene.detect(front, true);
+        if (apart) scene.detect(rear, false);
+        tracker.process(scene.frame);
+        if (k < 12) continue;
+        ASSERT_EQ(scene.frame.detection.tracks.size(), 1U) << k;
+        EXPECT_EQ(scene.frame.detection.tracks[0].state, DynamicState::kDynamic) << k;
+        for (const Detection& d : scene.frame.detection.detections) EXPECT_EQ(d.track, 0) << k;
+        // Whatever of it has become part of the map is cleared.
+        EXPECT_EQ(scene.frame.detection.cleared.size(), apart ? 1U : 0U) << k;
+    }
+}
+
 // Bonnets return little: of a car that comes only bumper and windscreen are seen.
 TEST_F(ObjectPartsTest, BumperAndWindscreenAreOneTrack) {
     Tracker tracker(sensor, config);
