@@ -36,6 +36,8 @@ std::unique_ptr<SessionMessages> make_messages(const Config& config, const drive
                                              [pipeline = config.pipeline] { set_up_thread("dlod-predict", pipeline); });
 }
 
+/// A large map on a slow disk takes longer than a stop otherwise may.
+constexpr std::chrono::seconds kTimeToSave{60};
 /// No packet for so long: the sensor is asked why.
 constexpr std::int64_t kSilence_ns = 2'000'000'000;
 /// Packets that do not fit the metadata, or whose sensor has started anew: it may be another one.
@@ -225,7 +227,10 @@ void LiveSession::log_health(const status_t& status) {
 void LiveSession::finish() {
     control_.reset();
     pipeline_.rethrow_failure();
-    if (writer_ || config_.saved_maps.at_stop) pipeline_.map().finish();
+    if (writer_ || config_.saved_maps.at_stop) {
+        service_.allow(kTimeToSave);
+        pipeline_.map().finish();
+    }
     if (config_.saved_maps.at_stop) save_last_map();
     if (writer_) finish_results();
     spdlog::info("stopped after {} frames, {} dropped", pipeline_.finished_frames(), pipeline_.dropped_frames());

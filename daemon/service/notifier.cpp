@@ -35,5 +35,8 @@ void ServiceNotifier::reloading() const {
 void ServiceNotifier::stopping() const {
     ::sd_notify(0, "STOPPING=1");
 }
+void ServiceNotifier::allow(std::chrono::seconds time) const {
+    ::sd_notifyf(0, "EXTEND_TIMEOUT_USEC=%lld", static_cast<long long>(std::chrono::microseconds(time).count()));
+}
 
 }  // namespace dlod::daemon

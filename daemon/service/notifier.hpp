@@ -1,6 +1,7 @@
 // What systemd is told about the service (sd_notify); nothing happens where systemd did not start it.
 #pragma once
 
+#include <chrono>
 #include <string>
 
 namespace dlod::daemon {
@@ -16,6 +17,8 @@ class ServiceNotifier {
     /// A reload has begun; ready() ends it.
     void reloading() const;
     void stopping() const;
+    /// What is under way may take as long, whatever the unit allows for it.
+    void allow(std::chrono::seconds time) const;
 };
 
 }  // namespace dlod::daemon

@@ -176,6 +176,15 @@ TEST_F(Faults, ResultFilesThatCannotBeMadeDoNotKeepAServiceFromItsWork) {
     run.stop();
 }
 
+/// systemd would end a stop that takes longer than the unit allows, and the map would be lost.
+TEST_F(Faults, AMapThatIsSavedAtTheStopHasTheTimeForIt) {
+    run.start({"--set", "saved_maps.at_stop=true"});
+    EXPECT_TRUE(run.poses_flow());
+    run.stop();
+    EXPECT_NE(run.systemd.messages().find("EXTEND_TIMEOUT_USEC=60000000"), std::string::npos);
+    EXPECT_TRUE(std::filesystem::exists(run.folder.path() / "maps" / "last.pcd")) << run.daemon->output();
+}
+
 TEST_F(Faults, APortThatAnotherProgramHasIsAwaited) {
     auto other = std::make_unique<test::ChildProcess>(
         std::vector<std::string>{DLOD_BINARY, "run", "-c", run.config().string(), "--lcm", "none"});
