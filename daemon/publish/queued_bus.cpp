@@ -14,8 +14,10 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// After a message that could not be sent: a server that is away is not looked for with each of them.
-constexpr auto kPause = std::chrono::seconds(1);
+/// After a message that could not be sent: a server that is away is not looked for with each of them, and the longer it
+/// is away, the less often, as LCM tells of each attempt in the log.
+constexpr auto kFirstPause = std::chrono::seconds(1);
+constexpr auto kLongestPause = std::chrono::seconds(8);
 constexpr auto kLeastPatienceAtTheEnd = std::chrono::milliseconds(200);
 
 struct Message {
@@ -66,6 +68,7 @@ void QueuedBus::State::put(const std::string& channel, std::span<const std::byte
 void QueuedBus::State::send_until_stopped() {
     std::unique_ptr<MessageBus> bus;
     Message message;
+    auto pause = kFirstPause;
     std::unique_lock lock(mutex);
     while (true) {
         changed.wait(lock, [this] { return stopping || waiting > 0; });
@@ -78,10 +81,12 @@ void QueuedBus::State::send_until_stopped() {
         lock.lock();
         if (sent) {
             moved = Clock::now();
+            pause = kFirstPause;
             changed.notify_all();
         } else {
             ++lost;
-            if (changed.wait_for(lock, kPause, [this] { return stopping; })) break;
+            if (changed.wait_for(lock, pause, [this] { return stopping; })) break;
+            pause = std::min(2 * pause, kLongestPause);
         }
     }
     lock.unlock();
