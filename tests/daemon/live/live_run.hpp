@@ -69,7 +69,7 @@ class LiveRun {
 
     static bool eventually(std::chrono::milliseconds timeout, const std::function<bool()>& condition) {
         // What holds at last is waited for: where all is slow, longer.
-        return LiveSubscriber::wait_until(kTooSlowForTimes ? 4 * timeout : timeout, condition);
+        return LiveSubscriber::wait_until(kTooSlowForTimes ? 12 * timeout : timeout, condition);
     }
     /// Forgets the poses so far and waits for `count` valid ones.
     bool poses_flow(std::size_t count = 5, std::chrono::milliseconds timeout = 15s) {
