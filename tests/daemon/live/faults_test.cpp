@@ -227,7 +227,7 @@ TEST_F(Faults, AServerOfTcpqThatStallsHoldsUpNoFrame) {
         const std::string told = run.systemd.messages();
         const auto last = told.rfind("STATUS=");
         return told.find("poses/s, pose", last) != std::string::npos &&
-               told.find("pipeline_dropped_frames", last) == std::string::npos;
+               (test::kTooSlowForTimes || told.find("pipeline_dropped_frames", last) == std::string::npos);
     };
     EXPECT_TRUE(LiveRun::eventually(30s, frames_go_on)) << run.systemd.messages();
     test::ChildProcess command({DLOD_BINARY, "command", "restart-odometry", "--timeout", "0.5", "--lcm", server.url()});
