@@ -1,24 +1,17 @@
 #include "core/odometry/bootstrap.hpp"
 
-#include <array>
 #include <cmath>
 #include <numbers>
 
 #include "core/odometry/motion_iteration.hpp"
+#include "core/odometry/witnesses.hpp"
 
 namespace dlod {
 namespace {
 
 constexpr int kPasses = 4;
-// A robot that stands, or nearly, sees so much of its first scan again.
-constexpr double kSameViewShare = 0.85;
 // Without IMU, one that seems to have moved farther meanwhile may have moved any other way as well.
 constexpr double kNearlyStanding_m = 0.05;
-// For the same: surfaces by the direction that they face in the plan, and points of one that make it count; more of
-// them where the IMU is at rest, as a few may lie at edges, and face elsewhere in the map.
-constexpr std::size_t kViewDirections = 4;
-constexpr double kMinViewPoints = 15.0;
-constexpr double kMinViewPointsAtRest = 100.0;
 // What a robot may be at when it is switched on: velocities to begin with, in eight directions of the horizontal plane.
 constexpr double kFirstSpeeds_mps[] = {5.0, 10.0, 15.0};
 constexpr int kFirstDirections = 8;
@@ -33,6 +26,7 @@ constexpr double kSkewReach_m = 10.0;
 
 void Bootstrap::begin(const PlacedScan& scan, const MotionFilter& filter) {
     pending_ = true;
+    told_ = true;
     first_filter_ = filter;
     published_ = filter.state();
     first_points_ = scan.points();
@@ -44,45 +38,15 @@ void Bootstrap::align(FrameRegistration& registration, MotionFilter& filter, Key
     const MotionFilter unmoved = first_filter_;
     registration.align(filter, map.submap(), {});
     const bool nearly_stands = filter.uses_imu() || filter.correction().head<3>().norm() < kNearlyStanding_m;
-    first_filter_ = nearly_stands && sees_the_same(registration, at_rest ? kMinViewPointsAtRest : kMinViewPoints)
-                        ? unmoved
-                        : likeliest_start(second);
+    const bool stands = nearly_stands && Witnesses(registration.scan(), registration.matches()).see_the_same();
+    first_filter_ = stands ? unmoved : likeliest_start(second);
     begin_again(second);
     settle(second, kPasses, FrameRegistration::kManyIterations);
     registration.align(filter, map.submap(), {});
-}
-
-/// The first scan is seen again, as a whole and by its surfaces of every direction: in a street, facades and ground
-/// look the same from everywhere, and only the little that faces along it tells a motion.
-bool Bootstrap::sees_the_same(const FrameRegistration& registration, double least_points) {
-    const PlacedScan& scan = registration.scan();
-    // Raw points, as of leaves, find no surface in a map of one scan.
-    double flat = 0.0;
-    std::array<double, kViewDirections> seen{};
-    std::array<double, kViewDirections> again{};
-    const auto count = [](std::array<double, kViewDirections>& counts, float nx, float ny) {
-        if (nx * nx + ny * ny < 0.5F) return;
-        // Both sides of a surface are one direction. The axes lie in the middle of theirs.
-        const double half_turns = std::atan2(static_cast<double>(ny), static_cast<double>(nx)) / std::numbers::pi + 2.0;
-        ++counts[static_cast<std::size_t>(half_turns * kViewDirections + 0.5) % kViewDirections];
-    };
-    for (std::size_t i = 0; i < scan.left_out().size(); ++i) {
-        if (!scan.takes_part(i) || !scan.points().is_flat(i)) continue;
-        flat += 1.0;
-        count(seen, scan.placed().nx[i], scan.placed().ny[i]);
-    }
-    const PlaneMatches& matches = registration.matches();
-    double flat_again = 0.0;
-    for (std::size_t i = 0; i < matches.flat; ++i) {
-        if (!registration.lies_on_plane(i)) continue;
-        flat_again += 1.0;
-        count(again, matches.h[0][i], matches.h[1][i]);
-    }
-    if (flat_again < kSameViewShare * flat) return false;
-    for (std::size_t k = 0; k < kViewDirections; ++k) {
-        if (seen[k] >= least_points && again[k] < kSameViewShare * seen[k]) return false;
-    }
-    return true;
+    if (at_rest || stands) return;
+    PlaneMatches again;
+    registration.match(first_, map.submap(), again);
+    told_ = Witnesses(registration.scan(), registration.matches()).are_more_than_one_body(Witnesses(first_, again));
 }
 
 /// The robot may be fast already: beyond a metre or so between two scans, the registration finds the nearest of what

@@ -29,6 +29,8 @@ class Bootstrap {
     /// filter is left unfinished.
     /// @param at_rest says the IMU
     void align(FrameRegistration& registration, MotionFilter& filter, KeyframeDatabase& map, bool at_rest);
+    /// More than one body tells the motion that has been found; else it may be that body's.
+    bool is_told() const { return told_; }
     /// Stamp of the first scan, if it was published deskewed for a motion that was not its own: its points are off by
     /// more than a little.
     std::optional<std::int64_t> void_scan_ns() const;
@@ -40,12 +42,12 @@ class Bootstrap {
         MotionFilter& filter;
         KeyframeDatabase& map;
     };
-    static bool sees_the_same(const FrameRegistration& registration, double least_points);
     MotionFilter likeliest_start(const Second& second);
     void settle(const Second& second, int passes, int iterations_a_pass);
     void begin_again(const Second& second);
 
     bool pending_ = false;
+    bool told_ = true;
     MotionFilter first_filter_;    ///< at the stamp of the first scan
     MotionState published_;        ///< what the first scan was published with
     PointSelection first_points_;  ///< of the first scan

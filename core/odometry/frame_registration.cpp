@@ -25,6 +25,8 @@ constexpr double kTellingPoints = 50.0;
 // Level and biases, which a start under acceleration gets wrong, are known after so long: before, a prediction by the
 // IMU is no judge.
 constexpr double kSettling_s = 3.0;
+// One by the IMU that may be off by more than this is no better than one without: anything finds something to match.
+constexpr double kSurePrediction_m = 0.3;
 
 bool converged(const Vector6d& step) {
     return step.head<3>().norm() < kStopTranslation_m && step.tail<3>().norm() < kStopRotation_rad;
@@ -64,13 +66,14 @@ void FrameRegistration::set_target(const PlacedScan& scan, const Eigen::Isometry
 /// Gauss-Newton steps of the filter with what `match(i)` finds.
 template <class Match>
 void FrameRegistration::iterate(MotionFilter& filter, int most, Match&& match) {
+    const double predicted_m = filter.prior_deviation().head<3>().norm();
     for (int i = 0; i < most; ++i) {
         if (i > 0) scan_.move(filter);
         match(i);
         if (!has_matches()) return;
         if (i == 0) {
             accumulate(matches_, equations_);
-            held_.judge(matches_, equations_, filter.uses_imu());
+            held_.judge(matches_, equations_, filter.uses_imu() && predicted_m < kSurePrediction_m);
         }
         const Observability& seen = held_.observability();
         if (i > 0) seen.leave_facing(matches_);
@@ -106,15 +109,19 @@ void FrameRegistration::align(MotionFilter& filter, VoxelMap& submap, const Effo
 }
 
 void FrameRegistration::match(VoxelMap& submap) {
-    scan_to_submap_.match(scan_.points(), scan_.left_out(), scan_.placed(), submap, scan_.origin(), 1.0, matches_);
+    match(scan_, submap, matches_);
+}
+
+void FrameRegistration::match(const PlacedScan& scan, VoxelMap& submap, PlaneMatches& matches) const {
+    scan_to_submap_.match(scan.points(), scan.left_out(), scan.placed(), submap, scan.origin(), 1.0, matches);
 }
 
 bool FrameRegistration::has_matches() const {
     return matches_.count >= kMinMatches;
 }
 
-bool FrameRegistration::lies_on_plane(std::size_t match) const {
-    return std::abs(matches_.residual[match]) < kNear_m;
+bool FrameRegistration::lies_on_plane(const PlaneMatches& matches, std::size_t i) {
+    return std::abs(matches.residual[i]) < kNear_m;
 }
 
 /// Matches on their planes count for the motion, those off them against it. The ground itself says nothing: its rings
@@ -122,7 +129,7 @@ bool FrameRegistration::lies_on_plane(std::size_t match) const {
 MatchQuality FrameRegistration::quality() const {
     MatchQuality quality;
     for (std::size_t i = 0; i < matches_.count; ++i) {
-        quality.near += lies_on_plane(i) ? 1.0 : 0.0;
+        quality.near += lies_on_plane(matches_, i) ? 1.0 : 0.0;
         const auto nx = static_cast<double>(matches_.h[0][i]);
         const auto ny = static_cast<double>(matches_.h[1][i]);
         const double r = static_cast<double>(matches_.residual[i]) / kFit_m;

@@ -44,11 +44,14 @@ class FrameRegistration {
     /// Matches the scan as it is placed with the submap, once more.
     void match(VoxelMap& submap);
 
+    /// Matches another scan with the submap.
+    void match(const PlacedScan& scan, VoxelMap& submap, PlaneMatches& matches) const;
+    static bool lies_on_plane(const PlaneMatches& matches, std::size_t i);
+
     // Of the last matches.
     const PlaneMatches& matches() const { return matches_; }
     /// There are enough of them to go on with.
     bool has_matches() const;
-    bool lies_on_plane(std::size_t match) const;
     MatchQuality quality() const;
     /// Enough points have found the submap, and most of those lie on it.
     bool is_trustworthy(const MatchQuality& quality) const;

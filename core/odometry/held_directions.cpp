@@ -5,7 +5,8 @@
 namespace dlod {
 namespace {
 
-// What it takes to take a direction back without IMU: so many times what would have kept it, in so many frames on end.
+// What it takes to take a direction back where the prediction is not sure: so many times what would have kept it, in so
+// many frames on end.
 constexpr double kDemand = 6.0;
 constexpr int kFrames = 3;
 
@@ -16,8 +17,8 @@ void HeldDirections::begin_frame() {
     shows_all_ = false;
 }
 
-void HeldDirections::judge(const PlaneMatches& matches, const NormalEquations& equations, bool with_imu) {
-    const bool reluctant = adrift_ && !with_imu;
+void HeldDirections::judge(const PlaneMatches& matches, const NormalEquations& equations, bool sure) {
+    const bool reluctant = adrift_ && !sure;
     observability_ = Observability::of(matches, equations, reluctant ? kDemand : 1.0);
     shows_all_ = observability_.unobservable() == 0;
     if (reluctant && frames_showing_all_ < kFrames) {

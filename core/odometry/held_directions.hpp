@@ -5,14 +5,16 @@
 
 namespace dlod {
 
-/// A direction is let go of as soon as the matches do not show it. Without IMU it is taken back reluctantly: what comes
-/// into view in a tunnel are first of all people and vehicles, and for some frames these look like structure. So more
-/// has to face it than would have kept it, for several frames on end. With the IMU the prediction stays good enough for
-/// what moves not to match it, and in a street where little faces along it each frame without that little drifts.
+/// A direction is let go of as soon as the matches do not show it. It is taken back reluctantly: what comes into view
+/// in a tunnel are first of all people and vehicles, and for some frames these look like structure. So more has to face
+/// it than would have kept it, for several frames on end. But while the IMU keeps the prediction good enough for what
+/// moves not to match it, little is enough: in a street where little faces along it each frame without that little
+/// drifts.
 class HeldDirections {
   public:
     /// Judges the matches of a stage's first iteration.
-    void judge(const PlaneMatches& matches, const NormalEquations& equations, bool with_imu);
+    /// @param sure the prediction, by the IMU, is good enough to tell what moves
+    void judge(const PlaneMatches& matches, const NormalEquations& equations, bool sure);
     /// The last judgement.
     const Observability& observability() const { return observability_; }
     /// Nothing has been judged in this frame yet.

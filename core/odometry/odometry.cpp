@@ -26,7 +26,7 @@ constexpr double kLeastShare = 0.1;
 constexpr double kLeastShareAtStart = 0.2;
 // From one scan to the next a robot changes its velocity by less than this over a tenth of a second.
 constexpr double kPlausibleCorrection_m = 0.1;
-// Without IMU the motion of a robot that stands is known no better than this.
+// The motion of a robot that stands is known no better than this.
 constexpr double kSlow_mps = 0.15;
 constexpr double kSlow_radps = 0.1;
 
@@ -163,10 +163,12 @@ bool Odometry::register_frame(const Frame& frame) {
     return false;
 }
 
-/// Without IMU nothing supports the motion of a start but that the two scans fit, and that the way from one to the
-/// other is that of the motion which both have been deskewed for.
+/// A motion that a single body tells may be that body's. Without IMU nothing supports the motion of a start but that
+/// the two scans fit, and that the way from one to the other is that of the motion which both have been deskewed for.
 bool Odometry::starts_badly() const {
-    if (!bootstrap_.pending() || filter_.uses_imu()) return false;
+    if (!bootstrap_.pending()) return false;
+    if (!bootstrap_.is_told()) return true;
+    if (filter_.uses_imu()) return false;
     return FrameRegistration::contradicts(now_.quality, kLeastShareAtStart) ||
            filter_.correction().head<3>().norm() > kPlausibleCorrection_m;
 }
@@ -318,6 +320,12 @@ void Odometry::level(const Frame& frame) {
         levelling_.give_up();
         return;
     }
+    const bool shows_motion =
+        now_.registered && !registration_.is_degenerate() && filter_.state().velocity_mps.norm() > kSlow_mps;
+    if (imu_.at_rest() && !shows_motion) {
+        begin_world_at_rest(frame);
+        return;
+    }
     if (now_.begins_map || !now_.registered) return;
     switch (levelling_.see_scan(filter_, imu_.samples(), registration_.is_degenerate())) {
         case Levelling::Next::kWait:
@@ -332,6 +340,17 @@ void Odometry::level(const Frame& frame) {
             begin_levelled_world(frame);
             break;
     }
+}
+
+/// The robot has come to rest before it was known where down is: now it is, and that it does not move.
+void Odometry::begin_world_at_rest(const Frame& frame) {
+    now_.flags |= OdometryResult::kReinitialized;
+    levelling_.give_up();
+    keyframes_.clear();
+    registration_.held().reset();
+    world_sequence_ = frame.header.sequence;
+    started_ = false;
+    begin_world(frame);
 }
 
 /// The world begins anew with this scan, level.

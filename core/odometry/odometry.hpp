@@ -62,6 +62,7 @@ class Odometry {
     void retry_without_imu(const Frame& frame, const MotionFilter& before, bool absurd);
     bool find_again(const Frame& frame);
     void level(const Frame& frame);
+    void begin_world_at_rest(const Frame& frame);
     void begin_levelled_world(const Frame& frame);
     void remember(const Frame& frame);
     void write_result(Frame& frame);

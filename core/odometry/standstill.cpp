@@ -47,7 +47,7 @@ bool Standstill::shows_no_motion(const PointSelection& points) {
         for (int k = 0; k < 3; ++k) off += before.normal[k] * (position[k] - before.position[k]);
         const float root = 1.0F / (1.0F + off * off / (kKernel_m * kKernel_m));
         near += std::abs(off) < kKernel_m ? 1 : 0;
-        matches_.push(before.normal, position, off, root * root, 0.0F, 0);
+        matches_.push(before.normal, position, off, root * root, 0.0F, 0, static_cast<std::uint32_t>(i));
     }
     if (matches_.count < kLeastSurfaces) return false;
     if (static_cast<double>(near) < kNearShare * static_cast<double>(matches_.count)) return false;

@@ -61,10 +61,11 @@ void PlaneMatches::reserve(std::size_t n) {
     time_s.resize(length);
     lever_m.resize(length);
     surface.resize(length);
+    point.resize(length);
 }
 
 void PlaneMatches::push(const float n[3], const float l[3], float distance, float inverse_variance, float time,
-                        std::uint32_t of_surface) {
+                        std::uint32_t of_surface, std::uint32_t of_point) {
     h[0][count] = n[0];
     h[1][count] = n[1];
     h[2][count] = n[2];
@@ -76,6 +77,7 @@ void PlaneMatches::push(const float n[3], const float l[3], float distance, floa
     time_s[count] = time;
     lever_m[count] = std::sqrt(l[0] * l[0] + l[1] * l[1] + l[2] * l[2]);
     surface[count] = of_surface;
+    point[count] = of_point;
     ++count;
 }
 

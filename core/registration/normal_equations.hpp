@@ -20,6 +20,7 @@ struct PlaneMatches {
     AlignedVector<float> residual, weight, time_s;
     AlignedVector<float> lever_m;          ///< |q - s|
     AlignedVector<std::uint32_t> surface;  ///< equal for matches with the same plane
+    AlignedVector<std::uint32_t> point;    ///< number of the point in its scan
     std::size_t count = 0;
     std::size_t flat = 0;  ///< of them the first so many: those of points whose normal is known
 
@@ -27,7 +28,7 @@ struct PlaneMatches {
     void reserve(std::size_t n);
     void clear() { count = flat = 0; }
     void push(const float normal[3], const float lever[3], float distance, float inverse_variance, float time,
-              std::uint32_t of_surface);
+              std::uint32_t of_surface, std::uint32_t of_point);
 };
 
 /// Sums of weight h h^T dt^k and weight h residual dt^k.

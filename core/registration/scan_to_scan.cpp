@@ -83,7 +83,7 @@ void ScanToScan::match(const PointSelection& points, std::span<const std::uint8_
         const float fall = 1.0F / (1.0F + residual * residual / (kernel * kernel));
         const float lever[3] = {placed.lx[i], placed.ly[i], placed.lz[i]};
         matches.push(n.data(), lever, residual, points.planarity[i] * fall * fall / kNoiseVariance, points.time_s[i],
-                     static_cast<std::uint32_t>(cell));
+                     static_cast<std::uint32_t>(cell), static_cast<std::uint32_t>(i));
     }
     matches.flat = matches.count;
 }

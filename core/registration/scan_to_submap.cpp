@@ -100,7 +100,8 @@ void ScanToSubmap::match(const PointSelection& points, std::span<const std::uint
         const float fall = 1.0F / (1.0F + residual * residual * inverse_kernel2);
         const float weight = points.planarity[i] * fall * fall / (plane->thickness_m * plane->thickness_m);
         const float lever[3] = {placed.lx[i], placed.ly[i], placed.lz[i]};
-        matches.push(plane->normal, lever, residual, weight, points.time_s[i], plane->surface);
+        matches.push(plane->normal, lever, residual, weight, points.time_s[i], plane->surface,
+                     static_cast<std::uint32_t>(i));
         if (flat) matches.flat = matches.count;
     }
 }

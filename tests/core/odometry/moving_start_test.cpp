@@ -92,6 +92,39 @@ TEST(MotionAtStart, AtRestOnASlopeTheWorldIsLevelAtOnce) {
     }
 }
 
+/// A street whose houses leave little that faces along it, and a van before the robot that keeps its own speed.
+std::vector<SceneBox> street_behind_a_van() {
+    std::vector<SceneBox> scene = {{{-500, -9, -1}, {900, 9, 30}, true}};
+    for (const double x : {-38.0, -16.0, 31.0, 52.0, 74.0}) {
+        scene.push_back({{x, 7.5, -1}, {x + 4.0, 9, 6}});
+        scene.push_back({{x + 9.0, -9, -1}, {x + 12.0, -7.8, 8}});
+    }
+    scene.push_back({{7.0, -1.0, -0.8}, {11.0, 1.0, 1.2}, false, {8.0, 0.0, 0.0}});
+    return scene;
+}
+
+/// At 5 m/s for a second, then braking for two; on rough ground.
+Eigen::Isometry3d arrival(double t) {
+    t = std::min(t, 3.0);
+    const double u = std::max(0.0, t - 1.0);
+    return make_pose(so3_exp({0.015 * std::sin(9.0 * t), 0.0, 0.0}),
+                     {5.0 * std::min(t, 1.0) + 5.0 * u - 1.25 * u * u, 0.0, 0.01 * std::sin(12.0 * t)});
+}
+
+TEST(MotionAtStart, ThatASingleVehicleTellsIsNotBelieved) {
+    for (const bool use_imu : {true, false}) {
+        SCOPED_TRACE(use_imu);
+        SimulatedDrive drive(street_behind_a_van(), arrival);
+        OdometryConfig config;
+        config.use_imu = use_imu;
+        OdometryRun run(drive, config);
+        run.run(0, 45);
+        EXPECT_LT(run.largest_position_error(), 0.1);
+        // At the latest where it stands the robot knows.
+        for (std::size_t i = 35; i < run.frames.size(); ++i) EXPECT_TRUE(run.frames[i].valid) << i;
+    }
+}
+
 // Positions that do not come of the motion that the accelerometer feels: of a crowd, taken for the world.
 TEST(StartLevel, TellsPositionsThatTheAccelerometerDoesNotExplain) {
     ImuBuffer imu;

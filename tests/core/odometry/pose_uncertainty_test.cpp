@@ -18,7 +18,7 @@ PlaneMatches walls() {
         lever[axis] = 3.0F;
         lever[(axis + 1) % 3] = static_cast<float>(i % 7) - 3.0F;
         lever[(axis + 2) % 3] = static_cast<float>(i % 5) - 2.0F;
-        matches.push(normal, lever, 0.0F, 1e4F, 0.0F, static_cast<std::uint32_t>(i % 6));
+        matches.push(normal, lever, 0.0F, 1e4F, 0.0F, static_cast<std::uint32_t>(i % 6), 0);
     }
     return matches;
 }

@@ -39,7 +39,7 @@ std::vector<Match> random_matches(std::size_t count, std::uint64_t seed) {
 void fill(const std::vector<Match>& from, PlaneMatches& to) {
     to.reserve(from.size());
     to.clear();
-    for (const Match& m : from) to.push(m.normal.data(), m.lever.data(), m.distance, m.weight, m.time_s, 0);
+    for (const Match& m : from) to.push(m.normal.data(), m.lever.data(), m.distance, m.weight, m.time_s, 0, 0);
 }
 
 class Counts : public testing::TestWithParam<std::size_t> {};
@@ -141,7 +141,7 @@ double height_deviation(int surfaces, int points_each, double error_m) {
     for (int i = 0; i < surfaces * points_each; ++i) {
         const float lever[3] = {static_cast<float>(i % 7) - 3.0F, static_cast<float>(i % 5) - 2.0F, -1.0F};
         // Points of one surface do not follow each other.
-        matches.push(up, lever, 0.0F, 1e4F, 0.0F, static_cast<std::uint32_t>(1000 * (i % surfaces)));
+        matches.push(up, lever, 0.0F, 1e4F, 0.0F, static_cast<std::uint32_t>(1000 * (i % surfaces)), 0);
     }
     SurfaceInformation information;
     EXPECT_EQ(information.of(matches, error_m), information.of(matches, error_m));

@@ -28,7 +28,7 @@ PlaneMatches matches_of(int count, const std::function<Surface(double u, double 
         const Eigen::Vector3d off(gauss(random), gauss(random), gauss(random));
         const Eigen::Vector3f n = (s.normal + noise_rad * off).normalized().cast<float>();
         const Eigen::Vector3f p = s.point.cast<float>();
-        matches.push(n.data(), p.data(), 0.01F, 1e4F, -0.05F, static_cast<std::uint32_t>(i));
+        matches.push(n.data(), p.data(), 0.01F, 1e4F, -0.05F, static_cast<std::uint32_t>(i), 0);
     }
     return matches;
 }
