@@ -27,7 +27,7 @@ Answer tell(const LiveRun& run, const std::vector<std::string>& command) {
     line.insert(line.end(), command.begin(), command.end());
     line.insert(line.end(), {"-c", run.config().string()});
     test::ChildProcess child(line);
-    const auto code = child.wait(10s);
+    const auto code = child.wait(test::kTooSlowForTimes ? 30s : 10s);
     return {code.value_or(-1), child.output()};
 }
 
@@ -49,9 +49,16 @@ TEST(Waiting, CommandsAreAnsweredBeforeAndAfterTheSensorHasCome) {
 
     sensor.plug_in();
     EXPECT_TRUE(run.poses_flow());
-    const auto restart = tell(run, {"restart-odometry"});
+    Answer restart = tell(run, {"restart-odometry"});
+    const auto has_begun = [&] { return restart.text.find("has begun anew") != std::string::npos; };
+    if (test::kTooSlowForTimes) {  // a frame may take longer than the answer waits for one
+        run.eventually(10s, [&] {
+            if (!has_begun()) restart = tell(run, {"restart-odometry"});
+            return has_begun();
+        });
+    }
     EXPECT_EQ(restart.code, 0) << restart.text;
-    EXPECT_NE(restart.text.find("has begun anew"), std::string::npos) << restart.text;
+    EXPECT_TRUE(has_begun()) << restart.text;
     run.stop();
 }
 
