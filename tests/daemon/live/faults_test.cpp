@@ -181,7 +181,7 @@ TEST_F(Faults, AMapThatIsSavedAtTheStopHasTheTimeForIt) {
     run.start({"--set", "saved_maps.at_stop=true"});
     EXPECT_TRUE(run.poses_flow());
     run.stop();
-    EXPECT_NE(run.systemd.messages().find("EXTEND_TIMEOUT_USEC=60000000"), std::string::npos);
+    EXPECT_TRUE(run.systemd.wait_for("EXTEND_TIMEOUT_USEC=60000000", 1s)) << run.systemd.messages();
     EXPECT_TRUE(std::filesystem::exists(run.folder.path() / "maps" / "last.pcd")) << run.daemon->output();
 }
 
