@@ -140,7 +140,8 @@ bool is_front_of(const TrackedObject& rest, const TrackedObject& front) {
 }
 
 bool one_vehicle(const TrackedObject& whole, const TrackedObject& piece) {
-    if (!whole.drives()) return false;
+    // Who walks by himself, and has been known for longer, stands beside it.
+    if (!whole.drives() || (piece.is_body() && piece.goes_before(whole))) return false;
     const double differs = (whole.velocity() - piece.velocity()).head<2>().norm();
     const double tolerance = kSameVelocity_mps + 2.0 * (whole.velocity_sd() + piece.velocity_sd());
     return differs < tolerance && share_inside(piece.box(), whole.box(), kMargin_m) > kInside &&

@@ -150,6 +150,33 @@ TEST_F(ObjectPartsTest, TheRearOfABusThatCrawlsIsPartOfIt) {
     }
 }
 
+// He is within the outline that a vehicle is believed to have, and goes on about as fast.
+TEST_F(ObjectPartsTest, WhoIsOvertakenCloselyIsNoPartOfTheVehicle) {
+    Tracker tracker(sensor, config);
+    std::uint32_t walker = 0;
+    for (int k = 0; k < 45; ++k) {
+        scene.next();
+        const double x = 8.0 + 0.09 * k;
+        const int of_walker = static_cast<int>(scene.frame.detection.detections.size());
+        scene.add(person(x, 6.0));
+        if (k >= 15) {
+            std::vector<PixelIndex> vehicle;
+            for (int i = 0; i < 4; ++i) {
+                const double front_x = x - 1.0 + 0.08 * (k - 15);
+                const auto part = scene.place(body({front_x - 1.0 * i, 6.9, -1.2}, 0.9, 1.6));
+                vehicle.insert(vehicle.end(), part.begin(), part.end());
+            }
+            scene.detect(vehicle, true);
+        }
+        tracker.process(scene.frame);
+        const int track = scene.frame.detection.detections[static_cast<std::size_t>(of_walker)].track;
+        ASSERT_GE(track, 0) << k;
+        const std::uint32_t id = scene.frame.detection.tracks[static_cast<std::size_t>(track)].id;
+        if (k == 14) walker = id;
+        ASSERT_TRUE(k < 15 || id == walker) << k;
+    }
+}
+
 // Bonnets return little: of a car that comes only bumper and windscreen are seen.
 TEST_F(ObjectPartsTest, BumperAndWindscreenAreOneTrack) {
     Tracker tracker(sensor, config);
