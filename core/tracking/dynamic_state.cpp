@@ -124,8 +124,6 @@ DynamicState MotionBelief::fused(const MotionCues& seen, const DynamicStateConfi
     // What is known to move has stopped, and a door's leaf hardly moves at its hinge.
     has_turned_ = has_turned_ || seen.turned;
     cues.stands = config.use_displacement && seen.stands && !known_to_move_ && !has_turned_;
-    // Against what was mapped a moment ago a walker's residual has not come to the threshold yet.
-    cues.residual_would_show = detections_ >= config.n_min;
     double step = motion_log_odds(cues, config);
     // What comes into view where nothing was ever seen differs from the map, too: that makes it a suspect, no more.
     if (config.use_free_space && free_share(cues) < 0.0 && !cues.sustained_displacement) {

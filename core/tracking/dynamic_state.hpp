@@ -15,7 +15,7 @@ struct MotionCues {
     double average_residual_m = 0.0;
     int residual_points = 0;
     double height_m = 0.0;            ///< h_S of Eq. 6
-    bool residual_would_show = true;  ///< of what moves: false while it is too young
+    bool residual_would_show = true;  ///< if it moved: false where it would not have gone far enough yet
     int free_points = 0;              ///< pixels where earlier frames saw free space
     int occupied_points = 0;          ///< pixels where they saw a surface
     int unknown_points = 0;

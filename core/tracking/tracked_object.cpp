@@ -181,6 +181,8 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
     }
     cues.average_residual_m = cues.residual_points > 0 ? residual_sum / cues.residual_points : 0.0;
     cues.height_m = visible_.size_m.z();
+    // Against what was mapped a moment ago a walker's residual has not come to the threshold yet; a vehicle's has.
+    cues.residual_would_show = hits_ + 1 >= config.state.n_min || visible_.longest_m() > kTwoBodies_m;
     cues.shift_m = shift_m;
     cues.dt_s = unseen_s_;
     cues.position_m = filter_.box().center_m.head<2>();
