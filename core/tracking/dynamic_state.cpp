@@ -23,6 +23,8 @@ constexpr double kMaxStep = 2.4;      // one frame alone never decides
 constexpr double kAway_m = 0.15;      // from the mean place of rest
 constexpr double kRestMean = 0.1;     // weight of a new position in that mean
 constexpr double kResting = 0.5;      // of the time of rest
+constexpr double kOwnWay = 0.6;       // of its length: the middle of what comes into view goes half of that
+constexpr double kFar_m = 3.0;        // of a car; buses need go no farther
 constexpr int kAwayDetections = 2;    // in a row off the place of rest: it has set off
 constexpr double kSettingOff_s = 1.0;   // until it has left that place
 constexpr double kOutOfSight_s = 0.45;  // what is found after longer may be something else
@@ -154,7 +156,9 @@ DynamicState MotionBelief::fused(const MotionCues& seen, const DynamicStateConfi
         // dynamic was none of that.
         const bool mistaken = log_odds_ <= (cues.stands ? 0.0 : config.static_log_odds);
         dynamic_s_ += cues.dt_s;
-        known_to_move_ = known_to_move_ || dynamic_s_ >= config.rest_time_s;
+        way_m_ = std::max(way_m_, (cues.position_m - set_out_m_).norm());
+        known_to_move_ =
+            known_to_move_ || (dynamic_s_ >= config.rest_time_s && way_m_ > std::min(kOwnWay * cues.longest_m, kFar_m));
         const bool halted = mistaken && dynamic_s_ >= config.rest_time_s;
         rested_ = rest_s_ >= (halted ? kResting : 1.0) * config.rest_time_s;
         off_anchor_ = 0;
@@ -174,7 +178,8 @@ DynamicState MotionBelief::fused(const MotionCues& seen, const DynamicStateConfi
     if (log_odds_ >= config.dynamic_log_odds && (sure || detections_ >= config.min_hits)) {
         rest_s_ = 0.0;
         dynamic_s_ = 0.0;
-        anchor_m_ = cues.position_m;
+        way_m_ = 0.0;
+        anchor_m_ = set_out_m_ = cues.position_m;
         return DynamicState::kDynamic;
     }
     const bool waited = detections_ >= config.n_max && log_odds_ < 0.5 * config.dynamic_log_odds;

@@ -27,6 +27,7 @@ struct MotionCues {
     bool set_off = false;                 ///< what rested is displaced from where it did
     bool stands = false;                  ///< its own points lie where they were, and its middle does
     Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< filtered centre, ground plane
+    double longest_m = 0.0;                                ///< side of its box
     double dt_s = 0.0;                                     ///< since the detection before
 
     /// It has gone farther than it is large: as good as any registration.
@@ -45,7 +46,8 @@ class MotionBelief {
     DynamicState state() const { return state_; }
     double log_odds() const { return log_odds_; }
     int detections() const { return detections_; }
-    /// It has been dynamic for as long as it takes to be at rest: what moves, rests and moves again.
+    /// It has been dynamic for as long as it takes to be at rest, and has gone as far as it is long meanwhile: what
+    /// moves, rests and moves again.
     bool known_to_move() const { return known_to_move_; }
     /// It was dynamic, and stands.
     bool rested() const { return rested_; }
@@ -63,7 +65,9 @@ class MotionBelief {
     DynamicState state_ = DynamicState::kUndefined;
     double log_odds_ = 0.0;
     double rest_s_ = 0.0;
-    double dynamic_s_ = 0.0;  ///< in the state dynamic, the last time
+    double dynamic_s_ = 0.0;                               ///< in the state dynamic, the last time
+    Eigen::Vector2d set_out_m_ = Eigen::Vector2d::Zero();  ///< where it became dynamic,
+    double way_m_ = 0.0;                                   ///< and the farthest that it was from there since
     bool known_to_move_ = false;
     bool has_turned_ = false;  ///< as a door does
     int detections_ = 0;

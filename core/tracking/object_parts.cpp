@@ -114,7 +114,7 @@ std::optional<PartFit> PartHost::fit(const Detection& part, const CandidateDetec
     const bool rest = is_rest(part);
     // Where a vehicle that moves is there is nothing else, even if it has been there itself before: of what crawls a
     // whole side has.
-    const bool covered = object_->is_moving_vehicle() && share_inside(part.box, box, kPartMargin_m) > kInsideVehicle;
+    const bool covered = object_->is_moving_vehicle() && share_inside(part.box, box, 0.0) > kInsideVehicle;
     if (!rest && !covered && contradicts(part, evidence)) return std::nullopt;
     if (height_gap_m(box, part.box) > kMaxGap_m) return std::nullopt;
     std::optional<double> margin = margin_m(part, guest, rest);

@@ -186,6 +186,7 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
     cues.shift_m = shift_m;
     cues.dt_s = unseen_s_;
     cues.position_m = filter_.box().center_m.head<2>();
+    cues.longest_m = filter_.box().longest_m();
     if (config.state.use_displacement && (watched_at_rest() || !clear_without_displacement(cues)))
         displacement_cue(frame, sighting, shape.age_s, config.state, cues);
     if (config.state.use_displacement && walked) cues.take_walked_way();

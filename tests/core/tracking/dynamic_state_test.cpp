@@ -210,6 +210,23 @@ TEST(DynamicState, WhatIsKnownToMoveAndStandsIsNoMistake) {
     EXPECT_EQ(belief.state(), DynamicState::kStatic);
 }
 
+// More and more of a parked car comes into view: its middle goes by half of its length.
+TEST(DynamicState, WhatComesIntoViewIsNotKnownToMove) {
+    const DynamicStateConfig config;
+    for (const double way_m : {2.2, 3.2}) {
+        MotionBelief belief;
+        for (int n = 0; n <= 40; ++n) {
+            MotionCues cues = free_cue(60, 10);
+            cues.position_m.x() = way_m * n / 40.0;
+            cues.longest_m = 4.2;
+            cues.dt_s = 0.1;
+            belief.update(cues, config);
+        }
+        EXPECT_EQ(belief.state(), DynamicState::kDynamic) << way_m;
+        EXPECT_EQ(belief.known_to_move(), way_m > 3.0) << way_m;
+    }
+}
+
 // A bus that halts stands where it was seen a moment ago; when it sets off its side slides along itself.
 TEST(DynamicState, WhatCameToRestSetsOffByItsWayAloneEvenIfThePastSpokeAgainstItSoon) {
     const DynamicStateConfig config;
@@ -235,11 +252,15 @@ TEST(DynamicState, WhatCameToRestSetsOffByItsWayAloneEvenIfThePastSpokeAgainstIt
 TEST(DynamicState, WhatSetsOffIsDynamicAtOnceWhateverTheFreeSpaceSaysOfIt) {
     const DynamicStateConfig config;
     MotionBelief belief;
-    for (int n = 0; n < 35; ++n) belief.update(free_cue(60, 10), config);
+    const auto at = [](MotionCues cues, double x_m) {
+        cues.position_m.x() = x_m;
+        return cues;
+    };
+    for (int n = 0; n < 35; ++n) belief.update(at(free_cue(60, 10), 0.1 * n), config);
     ASSERT_TRUE(belief.known_to_move());
-    for (int n = 0; n < 35; ++n) belief.update(free_cue(0, 100), config);
+    for (int n = 0; n < 35; ++n) belief.update(at(free_cue(0, 100), 3.4), config);
     ASSERT_EQ(belief.state(), DynamicState::kStatic);
-    MotionCues cues = free_cue(2, 98);
+    MotionCues cues = at(free_cue(2, 98), 3.4);
     cues.set_off = true;
     EXPECT_TRUE(belief.update(cues, config));
     EXPECT_TRUE(belief.has_set_off());
