@@ -12,6 +12,10 @@ namespace {
 constexpr int kPasses = 4;
 // Without IMU, one that seems to have moved farther meanwhile may have moved any other way as well.
 constexpr double kNearlyStanding_m = 0.05;
+// Points that face one direction of the plan and make it count; more of them where the IMU is at rest, as the search
+// for a velocity is long, and a few people are no reason for it.
+constexpr double kMinViewPoints = 15.0;
+constexpr double kMinViewPointsAtRest = 100.0;
 // What a robot may be at when it is switched on: velocities to begin with, in eight directions of the horizontal plane.
 constexpr double kFirstSpeeds_mps[] = {5.0, 10.0, 15.0};
 constexpr int kFirstDirections = 8;
@@ -38,7 +42,8 @@ void Bootstrap::align(FrameRegistration& registration, MotionFilter& filter, Key
     const MotionFilter unmoved = first_filter_;
     registration.align(filter, map.submap(), {});
     const bool nearly_stands = filter.uses_imu() || filter.correction().head<3>().norm() < kNearlyStanding_m;
-    const bool stands = nearly_stands && Witnesses(registration.scan(), registration.matches()).see_the_same();
+    const bool stands = nearly_stands && Witnesses(registration.scan(), registration.matches())
+                                             .see_the_same(at_rest ? kMinViewPointsAtRest : kMinViewPoints);
     first_filter_ = stands ? unmoved : likeliest_start(second);
     begin_again(second);
     settle(second, kPasses, FrameRegistration::kManyIterations);

@@ -14,9 +14,8 @@ namespace {
 
 // A robot that stands, or nearly, sees so much of its first scan again.
 constexpr double kSameShare = 0.85;
-// For that: directions in the plan, and points that face one that make it count.
+// For that: directions in the plan.
 constexpr std::size_t kDirections = 4;
-constexpr double kLeastPoints = 15.0;
 // Surfaces turned by more than this are no longer upright: sine of 45 degrees, squared.
 constexpr float kUpright = 0.5F;
 // Facing: within 60 degrees.
@@ -43,7 +42,7 @@ Witnesses::Witnesses(const PlacedScan& scan, const PlaneMatches& matches) {
     }
 }
 
-bool Witnesses::see_the_same() const {
+bool Witnesses::see_the_same(double least_points) const {
     double flat = 0.0;
     std::array<double, kDirections> seen{};
     std::array<double, kDirections> again{};
@@ -59,7 +58,7 @@ bool Witnesses::see_the_same() const {
     }
     if (flat < kSameShare * static_cast<double>(points_.size())) return false;
     for (std::size_t k = 0; k < kDirections; ++k) {
-        if (seen[k] >= kLeastPoints && again[k] < kSameShare * seen[k]) return false;
+        if (seen[k] >= least_points && again[k] < kSameShare * seen[k]) return false;
     }
     return true;
 }

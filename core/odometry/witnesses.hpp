@@ -20,7 +20,8 @@ class Witnesses {
     /// Nearly all of the scan lies where the map has it, as a whole and by its surfaces of every direction: in a
     /// street, facades and ground look the same from everywhere, and only the little that faces along it tells a
     /// motion.
-    bool see_the_same() const;
+    /// @param least_points that face a direction make it count
+    bool see_the_same(double least_points) const;
     /// Where a single thing, no larger than a vehicle, is all that speaks for the motion along some direction, that
     /// thing may be what moves: it takes others to tell. Without the one that speaks most, enough of what faces that
     /// direction has to lie where the map has it.

@@ -107,12 +107,12 @@ TEST(Witnesses, WhereNothingFacesADirectionThePredictionHoldsIt) {
 
 TEST(Witnesses, ARobotThatStandsSeesSurfacesOfAllDirectionsAgain) {
     View view = street();
-    EXPECT_TRUE(view.witnesses().see_the_same());
+    EXPECT_TRUE(view.witnesses().see_the_same(15.0));
     view.see(10, 6.0, 0.0, -1.0, 0.0, kOff_m);
-    EXPECT_TRUE(view.witnesses().see_the_same());
+    EXPECT_TRUE(view.witnesses().see_the_same(15.0));
     // However little there is along the street.
     view.see(10, -6.0, 0.0, 1.0, 0.0, kOff_m);
-    EXPECT_FALSE(view.witnesses().see_the_same());
+    EXPECT_FALSE(view.witnesses().see_the_same(15.0));
 }
 
 }  // namespace
