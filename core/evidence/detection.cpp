@@ -1,6 +1,7 @@
 #include "core/evidence/detection.hpp"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 
 #include "core/evidence/completion.hpp"
@@ -157,6 +158,11 @@ void Detector::State::complete(Frame& frame) {
         detection.residual_points = residual.count;
     }
     result.pixels.swap(completed);
+    result.motion.clear();
+    if (!config.use_free_space) return;
+    constexpr std::array<std::int8_t, 5> kMotion{0, 0, 1, -1, 0};  // by Evidence
+    for (const PixelIndex pixel : result.pixels)
+        result.motion.push_back(kMotion[static_cast<std::size_t>(evidence[pixel])]);
 }
 
 void Detector::State::detect(Frame& frame) {
@@ -187,6 +193,7 @@ Detector::~Detector() = default;
 void Detector::process(Frame& frame) {
     State& state = *state_;
     frame.detection.pixels.clear();
+    frame.detection.motion.clear();
     frame.detection.detections.clear();
     state.residuals.update(frame.odometry);
     if (frame.odometry.earlier_is_void()) state.evidence.forget();

@@ -2,7 +2,8 @@
 //
 // Glass lets a beam through, reflects it, or returns it, as the angle has it: what is seen of a parked car's windows,
 // and of what is behind them, lies where an earlier frame looked through and saw nothing. None of that has moved, while
-// the frame around the window has stayed where it was.
+// the frame around the window has stayed where it was, or at least the body below it: of a car no taller than the
+// sensor the roof is not seen.
 #pragma once
 
 #include <cstdint>
@@ -51,9 +52,12 @@ class FramedOpenings {
     struct Tile {
         float nearest_m = 1e9F;
         float farthest_m = -1e9F;
+        bool was_free = false;  ///< something in the tile was found free
     };
     /// Whether within so many steps over the tiles something was there, between these ranges.
     bool met(int row, int column, int row_step, int column_step, int steps, float nearest_m, float farthest_m) const;
+    /// Whether within so many tiles below something was there that may be the body which a window is in.
+    bool is_above_body(int row, int column, int rows, float range_m) const;
 
     FramedOpeningsConfig config_;
     Image<Tile> tiles_;

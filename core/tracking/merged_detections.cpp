@@ -265,6 +265,8 @@ void MergedDetections::divide_one(Frame& frame, DetectionShapes& shapes, std::si
     // Stable order by owner, in place of the whole.
     pixels_.assign(frame.detection.pixels.begin() + whole.first,
                    frame.detection.pixels.begin() + whole.first + whole.count);
+    std::vector<std::int8_t>& motion = frame.detection.motion;
+    if (!motion.empty()) motion_.assign(motion.begin() + whole.first, motion.begin() + whole.first + whole.count);
     x_.assign(points.x.begin(), points.x.end());
     y_.assign(points.y.begin(), points.y.end());
     z_.assign(points.z.begin(), points.z.end());
@@ -281,13 +283,23 @@ void MergedDetections::divide_one(Frame& frame, DetectionShapes& shapes, std::si
         part.occupied_points = shared(whole.occupied_points);
         part.unknown_points = shared(whole.unknown_points);
         part.edge_points = shared(whole.edge_points);
+        int free = 0, stood = 0;
         for (std::size_t i = 0; i < whole.count; ++i) {
             if (owner_[i] != k) continue;
             frame.detection.pixels[to] = pixels_[i];
+            if (!motion.empty()) {
+                motion[to] = motion_[i];
+                free += motion_[i] > 0 ? 1 : 0;
+                stood += motion_[i] < 0 ? 1 : 0;
+            }
             all.x[to] = x_[i];
             all.y[to] = y_[i];
             all.z[to] = z_[i];
             ++to;
+        }
+        if (!motion.empty()) {
+            part.free_points = free;
+            part.occupied_points = stood + part.edge_points;
         }
         const std::size_t at = k == 0 ? index : detections.size();
         if (k == 0) {

@@ -68,6 +68,7 @@ class MergedDetections {
     std::vector<std::size_t> apart_;
     std::vector<std::size_t> owner_, counts_;
     std::vector<PixelIndex> pixels_;
+    std::vector<std::int8_t> motion_;
     std::vector<float> x_, y_, z_, along_;
 };
 

@@ -58,6 +58,40 @@ BoxMeasurement first_measurement(const DetectionShapes& shapes, const Sighting& 
     return m;
 }
 
+/// What the free space and the residuals say of all its parts together. Of small segments all is tested, of large ones
+/// samples: each counts by its pixels.
+MotionCues evidence_of(const DetectionResult& result, const Sighting& sighting) {
+    MotionCues cues;
+    double residual_sum = 0.0;
+    double pixels = 0.0, tested = 0.0, free = 0.0, occupied = 0.0, unknown = 0.0;
+    const auto tested_of = [](const Detection& d) { return d.free_points + d.occupied_points + d.unknown_points; };
+    for (std::size_t d : sighting.detections) {
+        const Detection& part = result.detections[d];
+        residual_sum += part.average_residual_m * part.residual_points;
+        cues.residual_points += part.residual_points;
+        int of_segment = 0;
+        double pixels_of_segment = 0.0;
+        for (std::size_t other : sighting.detections) {
+            if (result.detections[other].segment != part.segment) continue;
+            of_segment += tested_of(result.detections[other]);
+            pixels_of_segment += result.detections[other].count;
+        }
+        const double weight = pixels_of_segment / std::max(1, of_segment);
+        free += weight * part.free_points;
+        occupied += weight * (part.occupied_points - part.edge_points);
+        unknown += weight * (part.unknown_points + part.edge_points);
+        tested += tested_of(part);
+        pixels += part.count;
+        cues.turned = cues.turned || part.turned;
+    }
+    const auto of_tested = [&](double n) { return static_cast<int>(std::lround(n * tested / std::max(1.0, pixels))); };
+    cues.free_points = of_tested(free);
+    cues.occupied_points = of_tested(occupied);
+    cues.unknown_points = of_tested(unknown);
+    cues.average_residual_m = cues.residual_points > 0 ? residual_sum / cues.residual_points : 0.0;
+    return cues;
+}
+
 }  // namespace
 
 OrientedBox TrackedObject::visible_box(const Frame& frame, const DetectionShapes& shapes, const Sighting& sighting,
@@ -166,20 +200,9 @@ void TrackedObject::see(const Frame& frame, const DetectionShapes& shapes, const
     // At the stamp, as the filter's centre.
     visible_.center_m += shape.age_s * filter_.velocity() - filter_.box().center_m;
 
-    MotionCues cues;
-    double residual_sum = 0.0;
+    MotionCues cues = evidence_of(frame.detection, sighting);
     points_ = 0;
-    for (std::size_t d : sighting.detections) {
-        const Detection& part = frame.detection.detections[d];
-        residual_sum += part.average_residual_m * part.residual_points;
-        cues.residual_points += part.residual_points;
-        cues.free_points += part.free_points;
-        cues.occupied_points += part.occupied_points - part.edge_points;
-        cues.unknown_points += part.unknown_points + part.edge_points;
-        cues.turned = cues.turned || part.turned;
-        points_ += static_cast<int>(part.count);
-    }
-    cues.average_residual_m = cues.residual_points > 0 ? residual_sum / cues.residual_points : 0.0;
+    for (std::size_t d : sighting.detections) points_ += static_cast<int>(frame.detection.detections[d].count);
     cues.height_m = visible_.size_m.z();
     // Against what was mapped a moment ago a walker's residual has not come to the threshold yet; a vehicle's has.
     cues.residual_would_show = hits_ + 1 >= config.state.n_min || visible_.longest_m() > kTwoBodies_m;

@@ -135,6 +135,11 @@ bool is_at_front_of(const Detection& rest, const Detection& front) {
 
 bool is_front_of(const TrackedObject& rest, const TrackedObject& front) {
     if (front.state() != DynamicState::kDynamic || front.is_body()) return false;
+    // What is known as a whole vehicle is no front of another one.
+    const OrientedBox box = front.box();
+    if (box.longest_m() > kShortest_m &&
+        joint_size(box, rest.box(), box.yaw_rad).maxCoeff() > kRestSize * box.longest_m())
+        return false;
     const double differs = (rest.velocity() - front.velocity()).head<2>().norm();
     return differs < kSameVelocity_mps + 2.0 * rest.velocity_sd() + std::min(kKnownVelocity_mps, front.velocity_sd());
 }

@@ -23,6 +23,7 @@ Frame::Frame(const SensorModel& sensor) {
     detection.label.resize(h, w);
     detection.instance.resize(h, w);
     detection.pixels.reserve(sensor.pixels());
+    detection.motion.reserve(sensor.pixels());
     detection.detections.reserve(1024);
     detection.tracks.reserve(512);
 }

@@ -148,6 +148,9 @@ struct OdometryResult {
 /// Written by detection and tracking.
 struct DetectionResult {
     std::vector<PixelIndex> pixels;  ///< of all detections, grouped by detection
+    /// Of each of them: 1 where earlier frames saw free space, -1 where they saw a surface, else 0. Empty without
+    /// free-space evidence.
+    std::vector<std::int8_t> motion;
     std::vector<Detection> detections;
     std::vector<Track> tracks;      ///< seen in, or predicted for, this frame
     Image<std::uint8_t> label;      ///< PixelLabel
@@ -159,6 +162,7 @@ struct DetectionResult {
     /// No detections and no tracks.
     void clear() {
         pixels.clear();
+        motion.clear();
         detections.clear();
         tracks.clear();
         cleared.clear();

@@ -15,6 +15,7 @@ const SensorModel kSensor = test::even_sensor(96, 512, 0.5, -0.7);
 struct Car {
     double y_m = 0.0;             ///< of its middle
     bool window_returns = false;  ///< else what is behind it is seen
+    double window_top_m = 1.3;    ///< the car is 1.5 m tall
 };
 
 /// A room with a car whose side, with one window, is 4.5 m before the sensor.
@@ -27,7 +28,8 @@ double car_in_a_room(const Car& car, const Eigen::Vector3d& o, const Eigen::Vect
     const Eigen::Vector3d half(0.9, 2.2, 0.6);
     const double body = test::box_range(middle - half, middle + half, o, d);
     const Eigen::Vector3d hit = o + body * d;
-    const bool window = std::abs(hit.y() - car.y_m) < 0.7 && hit.z() > 0.95 && hit.z() < 1.3 && hit.x() < 4.6;
+    const bool window =
+        std::abs(hit.y() - car.y_m) < 0.7 && hit.z() > 0.95 && hit.z() < car.window_top_m && hit.x() < 4.6;
     return window && !car.window_returns ? range : test::nearest(range, body);
 }
 
@@ -73,6 +75,14 @@ TEST(FramedOpenings, WindowOfAParkedCarIsNoMotion) {
 
 TEST(FramedOpenings, WithoutReachNoneIsLookedFor) {
     EXPECT_GT(counts_of({.reach_m = 0.0}, window_begins_to_return).free, 20);
+}
+
+// The roof is no higher than the sensor: nothing is seen above the window.
+TEST(FramedOpenings, AWindowWithoutAnUpperSideIsAboveTheBodyOfTheCar) {
+    const auto counts =
+        counts_of({}, [](int frame) { return Car{.window_returns = frame >= 11, .window_top_m = 2.0}; });
+    EXPECT_LT(counts.free, 15);  // of 148: not every pixel of the body is tested
+    EXPECT_GT(counts.occupied, 40);
 }
 
 TEST(FramedOpenings, CarThatDrivesIsStillSeen) {

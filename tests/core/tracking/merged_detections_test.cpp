@@ -154,5 +154,30 @@ TEST_F(MergedDetectionsTest, AWalkerIsCutOutOfTheWallThatHeMergesWith) {
     }
 }
 
+// What earlier frames saw at the pixels of either part is the part's own, not its share of the whole.
+TEST_F(MergedDetectionsTest, PartsKeepTheirOwnEvidence) {
+    Tracker tracker(sensor, config);
+    for (int k = 0; k < 16; ++k) {
+        scene.next();
+        auto walker = scene.place(person(4.0 + 0.1 * k, 2.0));
+        scene.frame.detection.motion.assign(walker.size(), 1);
+        if (k == 15) {
+            Cylinder wall = person(4.0 + 0.1 * k + 1.3, 3.2);
+            wall.radius_m = 0.8;
+            const auto more = scene.place(wall);
+            walker.insert(walker.end(), more.begin(), more.end());
+            scene.frame.detection.motion.resize(walker.size(), -1);
+        }
+        scene.detect(walker, true);
+        tracker.process(scene.frame);
+    }
+    const auto& detections = scene.frame.detection.detections;
+    ASSERT_EQ(detections.size(), 2U);
+    EXPECT_GT(detections[0].free_points, 100);
+    EXPECT_LT(detections[0].occupied_points, 10);
+    EXPECT_LT(detections[1].free_points, 10);
+    EXPECT_GT(detections[1].occupied_points, 100);
+}
+
 }  // namespace
 }  // namespace dlod

@@ -272,5 +272,54 @@ TEST_F(ObjectPartsTest, AFrontAsWideAsTheVehicleBelongsToIt) {
     }
 }
 
+// A car that leaves a row of parked ones is known as a whole when its rear becomes one segment with one of them.
+TEST_F(ObjectPartsTest, AWholeVehicleIsNoFrontOfAParkedOne) {
+    Tracker tracker(sensor, config);
+    const auto car = [&](double x, double y, int pieces) {
+        std::vector<PixelIndex> all;
+        for (int i = 0; i < pieces; ++i) {
+            const auto part = scene.place(body({x + 1.2 * i, y, -1.2}, 0.9, 1.4));
+            all.insert(all.end(), part.begin(), part.end());
+        }
+        return all;
+    };
+    for (int k = 0; k < 24; ++k) {
+        scene.next();
+        const std::uint32_t segment = scene.detect(car(3.6, 4.0, 2), false).segment;
+        Detection& driving = scene.detect(car(5.2 + 0.06 * k, 4.2, k < 23 ? 3 : 1), true);
+        if (k == 23) driving.segment = segment;
+        tracker.process(scene.frame);
+    }
+    const auto& detections = scene.frame.detection.detections;
+    EXPECT_NE(detections[0].track, detections[1].track);
+}
+
+// Splinters are tested to the last pixel, of what they belong to some are.
+TEST_F(ObjectPartsTest, SplintersSpeakForTheirPixelsOnly) {
+    Tracker tracker(sensor, config);
+    for (int k = 0; k < 10; ++k) {
+        scene.next();
+        Cylinder parked = body({5.0, 0.0, -1.2}, 0.9, 1.4);
+        parked.points = 2400;
+        Detection& car = scene.detect(scene.place(parked), false);
+        car.occupied_points = 4;
+        car.unknown_points = 56;
+        car.residual_points = 0;
+        for (const double y : {-0.4, 0.0, 0.4}) {
+            if (k < 4) break;
+            Cylinder splinter = body({4.6, y, -0.2}, 0.15, 0.2);
+            splinter.points = 30;
+            Detection& pane = scene.detect(scene.place(splinter), true);
+            pane.free_points = 30;
+            pane.occupied_points = 0;
+            pane.average_residual_m = 0.02;
+        }
+        tracker.process(scene.frame);
+    }
+    const Track& car =
+        scene.frame.detection.tracks[static_cast<std::size_t>(scene.frame.detection.detections[0].track)];
+    EXPECT_NE(car.state, DynamicState::kDynamic);
+}
+
 }  // namespace
 }  // namespace dlod
