@@ -11,6 +11,8 @@ namespace {
 constexpr std::size_t kMinFirstPoints = 100;
 // After so long without a registration, or in doubt, the map is given up.
 constexpr double kLost_s = 2.0;
+// Frames farther apart have a gap between them.
+constexpr double kLongestPeriod_s = 0.2;
 // Without a scan for longer than this there is no prediction worth the name.
 constexpr double kMaxGap_s = 5.0;
 // Where the robot may be after that: standard deviations.
@@ -119,6 +121,7 @@ void Odometry::follow(const Frame& frame) {
     if (now_.registered) {
         judge();
         bootstrap_.end();
+        missing_since_ns_.reset();
         if (sure_) sure_ns_ = frame.header.stamp_ns;
         if (static_cast<double>(frame.header.stamp_ns - sure_ns_) * 1e-9 > kLost_s) {
             begin_map_here(frame, Matrix6d::Zero());
@@ -127,7 +130,11 @@ void Odometry::follow(const Frame& frame) {
     }
     // Two first scans that do not fit each other: one of them is no good, and which will be seen.
     const bool bad_start = bootstrap_.pending() && registration_.scan().flat_points() >= kMinFirstPoints;
-    const bool lost = registered_motion_.since_s(frame.header.stamp_ns) > kLost_s;
+    // Over a gap nobody has looked: what counts is the time for which scans do not fit.
+    if (!missing_since_ns_) {
+        missing_since_ns_ = frame.header.stamp_ns - static_cast<std::int64_t>(std::min(step_s, kLongestPeriod_s) * 1e9);
+    }
+    const bool lost = static_cast<double>(frame.header.stamp_ns - *missing_since_ns_) * 1e-9 > kLost_s;
     if (lost || bad_start) begin_map_here(frame, Matrix6d::Zero());
 }
 
@@ -281,6 +288,7 @@ void Odometry::begin_map(const Frame& frame, const Eigen::Isometry3d& T_world_se
     now_.begins_map = true;
     sure_ = filter_.uses_imu();
     sure_ns_ = frame.header.stamp_ns;
+    missing_since_ns_.reset();
     map_sequence_ = frame.header.sequence;
     levelling_.begin_map();
     uncertainty_.begin_map(T_world_sensor.translation(), covariance);

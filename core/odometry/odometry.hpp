@@ -87,10 +87,11 @@ class Odometry {
     Spaciousness spaciousness_;
 
     bool started_ = false;
-    bool sure_ = false;                 ///< scans have shown where the robot is since that was last in doubt
-    std::int64_t sure_ns_ = 0;          ///< stamp of the last frame for which they had, or that the map began with
-    std::uint64_t world_sequence_ = 0;  ///< of the frame that the world began with
-    std::uint64_t map_sequence_ = 0;    ///< of the frame that the map began with
+    bool sure_ = false;         ///< scans have shown where the robot is since that was last in doubt
+    std::int64_t sure_ns_ = 0;  ///< stamp of the last frame for which they had, or that the map began with
+    std::optional<std::int64_t> missing_since_ns_;  ///< stamp of the first of the last scans that found no place
+    std::uint64_t world_sequence_ = 0;              ///< of the frame that the world began with
+    std::uint64_t map_sequence_ = 0;                ///< of the frame that the map began with
     Course now_;
 };
 

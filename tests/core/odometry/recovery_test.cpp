@@ -158,6 +158,28 @@ TEST_P(Gap, OfThreeSecondsEndsInTheSameMap) {
 
 INSTANTIATE_TEST_SUITE_P(Odometry, Gap, testing::Bool());
 
+// Over the gap nobody has looked: the map is not given up with the first scan after it that fits nowhere.
+TEST(WithoutImu, ScansAfterAGapThatFitNowhereDoNotEndTheMapAtOnce) {
+    constexpr int kFrom = 15;
+    constexpr int kTo = 40;
+    constexpr int kTurned = 3;
+    SimulatedDrive drive(furnished_room(), [](double t) {
+        Eigen::Isometry3d T = drive_on(0.02 * t);
+        if (t > 0.1 * kTo - 0.05 && t < 0.1 * (kTo + kTurned) - 0.05)
+            T.linear() = T.linear() * Eigen::AngleAxisd(2.5, Eigen::Vector3d::UnitZ());
+        return T;
+    });
+    OdometryConfig config;
+    config.use_imu = false;
+    OdometryRun run(drive, config);
+    run.run(0, kFrom);
+    run.run(kTo, kTo + 30);
+    EXPECT_FALSE(run.any(kReinitialized));
+    EXPECT_FALSE(run.frames[kFrom].valid);
+    EXPECT_TRUE(run.frames.back().valid);
+    EXPECT_LT(run.largest_position_error(), 0.05);
+}
+
 struct ClockStep {
     const char* name;
     double lidar_s;
