@@ -11,6 +11,8 @@ namespace {
 constexpr std::size_t kMinFirstPoints = 100;
 // After so long without a registration, or in doubt, the map is given up.
 constexpr double kLost_s = 2.0;
+// Scans with fewer of their columns do not show all that there is.
+constexpr double kWholeShare = 0.8;
 // Frames farther apart have a gap between them.
 constexpr double kLongestPeriod_s = 0.2;
 // Without a scan for longer than this there is no prediction worth the name.
@@ -161,7 +163,7 @@ bool Odometry::register_frame(const Frame& frame) {
     }
     if (registration_.is_degenerate()) now_.flags |= OdometryResult::kDegenerate;
     now_.quality = registration_.quality();
-    if (registration_.is_trustworthy(now_.quality) && !starts_badly() &&
+    if (registration_.is_trustworthy(now_.quality) && !starts_badly(frame) &&
         !registration_.is_beside_its_map(filter_.pose_covariance(), config_.max_deviation_m)) {
         accept();
         return true;
@@ -172,9 +174,11 @@ bool Odometry::register_frame(const Frame& frame) {
 
 /// A motion that a single body tells may be that body's. Without IMU nothing supports the motion of a start but that
 /// the two scans fit, and that the way from one to the other is that of the motion which both have been deskewed for.
-bool Odometry::starts_badly() const {
+bool Odometry::starts_badly(const Frame& frame) const {
     if (!bootstrap_.pending()) return false;
-    if (!bootstrap_.is_told()) return true;
+    // Where packets are missing, so may be all others that could tell.
+    const bool whole = frame.header.valid_columns >= kWholeShare * sensor_.width;
+    if (whole && !bootstrap_.is_told()) return true;
     if (filter_.uses_imu()) return false;
     return FrameRegistration::contradicts(now_.quality, kLeastShareAtStart) ||
            filter_.correction().head<3>().norm() > kPlausibleCorrection_m;

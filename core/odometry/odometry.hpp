@@ -52,7 +52,7 @@ class Odometry {
     void begin_map_here(const Frame& frame, const Matrix6d& moved);
     void renew_map(const Frame& frame);
     bool register_frame(const Frame& frame);
-    bool starts_badly() const;
+    bool starts_badly(const Frame& frame) const;
     bool contradicts_map() const;
     void judge();
     bool stands(const Frame& frame);
